@@ -1,0 +1,377 @@
+//! The flat bond graph: what elaboration makes of a file, and all that later stages know of it.
+//!
+//! Signs. A bond carries an effort e and a flow f, both counted along its half arrow: its power e·f is positive from
+//! `from` to `to`. At a 0-junction all efforts are equal and Σ(±f) = 0; at a 1-junction all flows are equal and
+//! Σ(±e) = 0, + for half arrows that point in. An element's own e and f are its bond's, f counted into the element
+//! (so −f of the bond when the half arrow points out of it). A source *sets its bond's* variable whichever way the
+//! half arrow points. Two-ports: port 0 is counted into the element, port 1 out of it; a bond drawn the other way
+//! enters with −f. (Karnopp, Margolis, Rosenberg, *System Dynamics*, ch. 3 and 4.)
+
+use crate::expr;
+use crate::quantity::Domain;
+use crate::source::Span;
+
+macro_rules! index {
+    ($(#[$doc:meta] $name:ident)*) => { $(
+        #[$doc]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $name(pub u32);
+        impl $name {
+            /// The index for a slice.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    )* };
+}
+
+index! {
+    /// Index into [`BondGraph::parameters`].
+    ParameterId
+    /// Index into [`BondGraph::signals`].
+    SignalId
+    /// Index into [`BondGraph::vertices`].
+    VertexId
+    /// Index into [`BondGraph::bonds`].
+    BondId
+}
+
+/// An expression of the bond graph.
+pub type Expr = expr::Expr<Leaf>;
+
+/// What an expression of the bond graph may speak of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Leaf {
+    /// A parameter.
+    Parameter(ParameterId),
+    /// A signal or input.
+    Signal(SignalId),
+    /// Time in seconds.
+    Time,
+    /// Inside a law: the element's own variable.
+    Own(Variable),
+    /// A bond's variable, counted along the half arrow, or negated.
+    Bond { bond: BondId, variable: Power, negated: bool },
+    /// q of a compliance or p of an inertia.
+    Stored(VertexId),
+}
+
+/// The two power variables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Power {
+    Effort,
+    Flow,
+}
+
+impl Power {
+    /// Effort for flow and flow for effort.
+    pub fn dual(self) -> Power {
+        match self {
+            Power::Effort => Power::Flow,
+            Power::Flow => Power::Effort,
+        }
+    }
+}
+
+/// An element's own variables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Variable {
+    /// e or f, f counted into the element.
+    Power(Power),
+    /// q of a compliance, p of an inertia.
+    Stored,
+}
+
+/// A named value, in SI.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Its name; `motor.L` for one of an instance.
+    pub name: String,
+    /// How it was given, over other parameters only; a literal stays a literal.
+    pub expr: Expr,
+    /// Its value in SI.
+    pub value: f64,
+    /// The unit as written, for messages.
+    pub unit: Option<crate::quantity::Unit>,
+    /// The text in quotes after it.
+    pub description: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A signal: carries no power.
+#[derive(Clone, Debug)]
+pub struct Signal {
+    /// Its name; one made by elaboration (the state of a `pi`, a waveform within an expression) has a name that no
+    /// other has, built from the name of the signal it belongs to (`alpha_z`).
+    pub name: String,
+    /// What it is.
+    pub law: SignalLaw,
+    /// How it came to be.
+    pub origin: SignalOrigin,
+    /// Where it is declared.
+    pub span: Span,
+    /// Its unit, where one was found.
+    pub unit: Option<crate::quantity::Unit>,
+}
+
+/// How a signal came to be; decides the default columns and how it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SignalOrigin {
+    /// An `input` statement.
+    Input,
+    /// A `signal` statement.
+    Signal,
+    /// Made by elaboration.
+    Hidden,
+}
+
+/// The shapes of signals; every function with memory is written in terms of them.
+#[derive(Clone, Debug)]
+pub enum SignalLaw {
+    /// A value at each instant.
+    Algebraic(Expr),
+    /// dy/dt = rate, y(0) = initial.
+    Integrator { rate: Expr, initial: Initial },
+    /// A function of time alone with corners that the solver lands on.
+    Waveform(Waveform),
+}
+
+/// A value at t = 0.
+#[derive(Clone, Debug)]
+pub enum Initial {
+    /// As given.
+    Given(Expr),
+    /// As [`super::initial`] found it: an integrator that starts where its rate vanishes (`lag` without `ic`), or a
+    /// storage that takes the value its neighbours imply.
+    Implied,
+}
+
+/// Functions of time; arguments are expressions of parameters only. All are right-continuous.
+#[derive(Clone, Debug)]
+pub enum Waveform {
+    /// `before` until `at`, then `after`.
+    Step { at: Expr, before: Expr, after: Expr },
+    /// 0 until `at`, then `slope`·(t − at).
+    Ramp { at: Expr, slope: Expr },
+    /// As SPICE's PULSE; a rise or fall of 0 is an exact jump.
+    Pulse { low: Expr, high: Expr, delay: Expr, rise: Expr, fall: Expr, width: Expr, period: Expr },
+    /// As SPICE's SIN: `offset` + amplitude·exp(−(t−delay)·damping)·sin(2π·frequency·(t−delay) + phase) from `delay`
+    /// on, before it the value at `delay`; phase in radians.
+    Sine { offset: Expr, amplitude: Expr, frequency: Expr, delay: Expr, damping: Expr, phase: Expr },
+    /// Straight lines between points, holding the end values; two equal times make a jump.
+    Pwl(Vec<(Expr, Expr)>),
+}
+
+/// A junction or an element.
+#[derive(Clone, Debug)]
+pub struct Vertex {
+    /// Its name.
+    pub name: String,
+    /// What stands before the colon: `R`, `MTF`, `Se`, `0`.
+    pub kind: &'static str,
+    /// Its law.
+    pub law: Law,
+    /// Where it is declared.
+    pub span: Span,
+    /// Its bonds: one for a one-port, [port 1, port 2] for a two-port, in file order for a junction.
+    pub bonds: Vec<BondId>,
+}
+
+/// The closed set of shapes that laws have.
+#[derive(Clone, Debug)]
+pub enum Law {
+    /// Common effort.
+    Zero,
+    /// Common flow.
+    One,
+    /// Sets its bond's effort or flow. Detectors are sources of 0 (`De` sets flow 0, `Df` effort 0).
+    Source { sets: Power, value: Expr, detector: bool },
+    /// e and f at the same instant.
+    Dissipator(Dissipation),
+    /// Integrates one power variable into a stored one, whose law gives the other.
+    Store { kind: Storage, law: StoreLaw, initial: StoreInitial },
+    /// Rate form: der(e) = rate (compliance) or der(f) = rate (inertia), over its own f (or e) and anything else.
+    Rate { kind: Storage, rate: Expr, initial: Initial },
+    /// Ratio r: e1 = r·e2, f2 = r·f1. Gain g: e2 = g·e1, f1 = g·f2.
+    Transformer(Modulus),
+    /// Ratio r: e1 = r·f2, e2 = r·f1. Gain g: f1 = g·e2, f2 = g·e1.
+    Gyrator(Modulus),
+}
+
+/// Laws of dissipators.
+#[derive(Clone, Debug)]
+pub enum Dissipation {
+    /// e = R·f.
+    Linear(Expr),
+    /// e = law, over its own f.
+    Effort(Expr),
+    /// f = law, over its own e.
+    Flow(Expr),
+}
+
+/// The two kinds of storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// q = ∫f dt, gives e.
+    Compliance,
+    /// p = ∫e dt, gives f.
+    Inertia,
+}
+
+impl Storage {
+    /// The variable that is integrated: flow for a compliance, effort for an inertia.
+    pub fn integrates(self) -> Power {
+        match self {
+            Storage::Compliance => Power::Flow,
+            Storage::Inertia => Power::Effort,
+        }
+    }
+
+    /// The variable that the stored quantity gives.
+    pub fn gives(self) -> Power {
+        self.integrates().dual()
+    }
+}
+
+/// Laws of storages.
+#[derive(Clone, Debug)]
+pub enum StoreLaw {
+    /// e = q/C, f = p/I; the expression is C or I. May be modulated.
+    Linear(Expr),
+    /// e = law(q), f = law(p), over its own stored variable.
+    OfStored(Expr),
+    /// q = law(e), p = law(f), over its own power variable.
+    OfPower(Expr),
+}
+
+/// The initial value of a storage.
+#[derive(Clone, Debug)]
+pub enum StoreInitial {
+    /// `q0 =` or `p0 =`.
+    Stored(Expr),
+    /// `e0 =` or `f0 =`: the law is inverted.
+    Power(Expr),
+    /// Nothing stated: 0, or what its neighbours imply.
+    Unstated,
+}
+
+/// The modulus of a two-port, as it is stored: a reciprocal of a signal has become a gain.
+#[derive(Clone, Debug)]
+pub enum Modulus {
+    /// As the paper's r.
+    Ratio(Expr),
+    /// 1/r, never divided.
+    Gain(Expr),
+}
+
+/// An end of a bond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct End {
+    /// The junction or element.
+    pub vertex: VertexId,
+    /// 0 for one-ports and junctions; 0 or 1 for two-ports.
+    pub port: u32,
+}
+
+/// A bond with its half arrow from `from` to `to`.
+#[derive(Clone, Debug)]
+pub struct Bond {
+    /// The tail of the half arrow.
+    pub from: End,
+    /// Its head.
+    pub to: End,
+    /// A causal stroke drawn in the text.
+    pub given: Option<Stroke>,
+    /// Domain, [`Domain::Any`] when nothing says.
+    pub domain: Domain,
+    /// Where the arrow stands.
+    pub span: Span,
+}
+
+/// The end of a bond where the causal stroke is: the end on which the effort is imposed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stroke {
+    /// At the tail: `to` imposes the effort, `from` the flow.
+    AtFrom,
+    /// At the head: `from` imposes the effort, `to` the flow.
+    AtTo,
+}
+
+/// What a plain run does.
+#[derive(Clone, Debug, Default)]
+pub struct Experiment {
+    /// End of the run, seconds.
+    pub until: Option<f64>,
+    /// Output interval, seconds.
+    pub step: Option<f64>,
+    /// Options as (key, value), later ones win.
+    pub options: Vec<(String, String)>,
+    /// Observed variables in order.
+    pub observe: Vec<Observation>,
+}
+
+/// One observed column.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Its header.
+    pub name: String,
+    /// The value in SI.
+    pub expr: Expr,
+    /// The unit of the column as written after `in`, and how many SI units it is; (“”, 1) for SI.
+    pub unit: (String, f64),
+    /// The SI unit of the value where it is known (`Pa`, `rad/s`), else empty.
+    pub si_unit: String,
+}
+
+/// The whole graph, flat.
+#[derive(Clone, Debug, Default)]
+pub struct BondGraph {
+    /// The file's stem.
+    pub name: String,
+    /// Parameters, in file order.
+    pub parameters: Vec<Parameter>,
+    /// Signals and inputs, in file order, hidden ones before the signal that they belong to.
+    pub signals: Vec<Signal>,
+    /// Junctions and elements, in file order.
+    pub vertices: Vec<Vertex>,
+    /// Bonds, in file order.
+    pub bonds: Vec<Bond>,
+    /// What a plain run does.
+    pub experiment: Experiment,
+}
+
+impl BondGraph {
+    /// The junction or element of an index.
+    pub fn vertex(&self, id: VertexId) -> &Vertex {
+        &self.vertices[id.index()]
+    }
+
+    /// The bond of an index.
+    pub fn bond(&self, id: BondId) -> &Bond {
+        &self.bonds[id.index()]
+    }
+
+    /// All vertex indices.
+    pub fn vertex_ids(&self) -> impl Iterator<Item = VertexId> + use<> {
+        (0..self.vertices.len() as u32).map(VertexId)
+    }
+
+    /// All bond indices.
+    pub fn bond_ids(&self) -> impl Iterator<Item = BondId> + use<> {
+        (0..self.bonds.len() as u32).map(BondId)
+    }
+
+    /// +1 where the bond's half arrow points into the vertex at this port, −1 where it points out.
+    pub fn sign_into(&self, bond: BondId, vertex: VertexId, port: u32) -> f64 {
+        let bond = self.bond(bond);
+        if bond.to == (End { vertex, port }) { 1.0 } else { -1.0 }
+    }
+
+    /// `from -> to` in the words of the file.
+    pub fn bond_name(&self, id: BondId) -> String {
+        let bond = self.bond(id);
+        format!("{} -> {}", self.vertex(bond.from.vertex).name, self.vertex(bond.to.vertex).name)
+    }
+}

@@ -1,0 +1,4 @@
+//! Bond graphs: the language, the graph, causality, and the graph's own equations.
+
+pub mod graph;
+pub mod causality;

@@ -1,0 +1,182 @@
+//! The flat circuit: devices between nodes, every value a number or a law, and the stamps that it comes down to.
+//!
+//! Signs (as SPICE): a branch current runs from the first node through the device to the second.
+
+pub mod stamps;
+pub mod waveform;
+
+use crate::expr;
+use crate::source::Span;
+pub use waveform::Waveform;
+
+/// A node; 0 is ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub u32);
+
+/// Index into [`Circuit::devices`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DeviceId(pub u32);
+
+/// An expression over a circuit's variables; parameters have become numbers.
+pub type Expr = expr::Expr<Leaf>;
+
+/// What a law may speak of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Leaf {
+    /// v(a) − v(b).
+    Voltage(NodeId, NodeId),
+    /// The current through a device.
+    Current(DeviceId),
+    /// Time in seconds.
+    Time,
+}
+
+/// A node's name and scale.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Its name, `x1.out` within an instance.
+    pub name: String,
+    /// A typical magnitude of its voltage, where the netlist's header says one.
+    pub nominal: Option<f64>,
+    /// Where it is first used.
+    pub span: Span,
+}
+
+/// A device between nodes.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// Its name with its letter, `r_load`, `x1.r_load`, as written in the netlist.
+    pub name: String,
+    /// Its nodes.
+    pub nodes: Vec<NodeId>,
+    /// What it is.
+    pub kind: DeviceKind,
+    /// A typical magnitude of its current, where the netlist's header says one.
+    pub nominal: Option<f64>,
+    /// Its card; for a `.bg` run the line of the element.
+    pub span: Span,
+}
+
+/// The devices; each has a file of its own in `devices/` with equation, sign, units and source.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub enum DeviceKind {
+    Resistor {
+        resistance: f64,
+    },
+    Capacitor {
+        capacitance: f64,
+        initial: Option<f64>,
+    },
+    Inductor {
+        inductance: f64,
+        initial: Option<f64>,
+    },
+    /// Couples two inductors: M = k·√(L1·L2).
+    Mutual {
+        inductors: [DeviceId; 2],
+        coupling: f64,
+    },
+    VoltageSource {
+        waveform: Waveform,
+    },
+    CurrentSource {
+        waveform: Waveform,
+    },
+    /// v = gain·(v(c+) − v(c−)).
+    Vcvs {
+        gain: f64,
+        control: [NodeId; 2],
+    },
+    /// i = gain·(v(c+) − v(c−)).
+    Vccs {
+        gain: f64,
+        control: [NodeId; 2],
+    },
+    /// i = gain·i(control).
+    Cccs {
+        gain: f64,
+        control: DeviceId,
+    },
+    /// v = gain·i(control).
+    Ccvs {
+        gain: f64,
+        control: DeviceId,
+    },
+    /// v = law.
+    BehaviouralVoltage {
+        law: Expr,
+    },
+    /// i = law.
+    BehaviouralCurrent {
+        law: Expr,
+    },
+    /// Two-state switch with hysteresis, by a voltage or a current.
+    Switch {
+        control: Expr,
+        on: f64,
+        off: f64,
+        on_resistance: f64,
+        off_resistance: f64,
+        initially_on: Option<bool>,
+    },
+    /// Junction diode, level 1.
+    Diode {
+        model: DiodeModel,
+        area: f64,
+    },
+}
+
+/// Parameters of the level-1 diode in SI, at the nominal temperature of 27 °C.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct DiodeModel {
+    pub saturation_current: f64,
+    pub emission: f64,
+    pub series_resistance: f64,
+    pub junction_capacitance: f64,
+    pub junction_potential: f64,
+    pub grading: f64,
+    pub transit_time: f64,
+    pub forward_bias_depletion: f64,
+    pub breakdown_voltage: Option<f64>,
+    pub breakdown_current: f64,
+}
+
+/// An output column.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// Its header, as the netlist writes it (`v(out)`).
+    pub name: String,
+    /// Its value.
+    pub expr: Expr,
+}
+
+/// What is to be computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum Analysis {
+    OperatingPoint,
+    Transient { step: f64, stop: f64, start: f64, hmax: Option<f64>, uic: bool },
+}
+
+/// A flat circuit with what is to be computed on it.
+#[derive(Clone, Debug, Default)]
+pub struct Circuit {
+    /// First line of the netlist.
+    pub title: String,
+    /// Nodes; number 0 is ground.
+    pub nodes: Vec<Node>,
+    /// Devices, in netlist order.
+    pub devices: Vec<Device>,
+    /// `.ic` values.
+    pub initial: Vec<(NodeId, f64)>,
+    /// What is to be computed, in netlist order.
+    pub analyses: Vec<Analysis>,
+    /// Output columns; empty means every node voltage and branch current.
+    pub outputs: Vec<Output>,
+    /// `.options` and header options as (key, value), later ones win.
+    pub options: Vec<(String, String)>,
+    /// Output grid (interval), where the header or the command line asks for one.
+    pub grid: Option<f64>,
+}

@@ -1,0 +1,134 @@
+//! What devices contribute to the one equation of a circuit.
+//!
+//! Unknowns x: node voltages (ground left out), then branch currents in device order. Equations, one for each
+//! unknown: Kirchhoff's current law for a node (Σ of currents *leaving* it = 0), the branch's own law for a branch.
+//!
+//! ```text
+//! G·x + f(x, t, m) + A·d/dt Q(x) = b(t),    Q_k(x) = c_k·x + q_k(x)
+//! ```
+//!
+//! Each charge or flux Q_k is an entity of its own, with its column A_k of ±1: the network with all Q frozen
+//! (unknowns x and w = dQ/dt) gives consistent values at the start, after every corner and at output rows. m are
+//! modes: values that change only at events.
+
+use super::{DeviceId, Waveform};
+use crate::expr;
+
+/// Index of an unknown and of its equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct UnknownId(pub u32);
+
+/// A law over unknowns.
+pub type Law = expr::Expr<Leaf>;
+
+/// What a law may speak of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Leaf {
+    /// x[k].
+    Unknown(UnknownId),
+    /// dQ_k/dt, the current of a capacitor or the voltage of an inductor.
+    Rate(u32),
+    /// Time in seconds.
+    Time,
+    /// 0 or 1, the state of a mode.
+    Mode(u32),
+}
+
+/// What an unknown is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// As ngspice names it: `v(out)`, `i(l1)`.
+    pub name: String,
+    /// Whether it is a voltage (else a current).
+    pub voltage: bool,
+    /// A typical magnitude, where one is known.
+    pub nominal: Option<f64>,
+    /// The device whose branch it is, `None` for a node.
+    pub device: Option<DeviceId>,
+}
+
+/// A charge or flux Q = linear·x + law(x), whose rate enters equations.
+#[derive(Clone, Debug)]
+pub struct Charge {
+    /// The device that stores it.
+    pub device: DeviceId,
+    /// The linear part.
+    pub linear: Vec<(UnknownId, f64)>,
+    /// The non-linear part.
+    pub law: Option<Law>,
+    /// The equations that its rate enters, with their signs.
+    pub into: Vec<(UnknownId, f64)>,
+    /// Q at t = 0 where the card says so (`IC=`).
+    pub initial: Option<f64>,
+}
+
+/// A term of f: `law` enters each equation of `into` with its factor.
+#[derive(Clone, Debug)]
+pub struct LawStamp {
+    /// The device.
+    pub device: DeviceId,
+    /// The term.
+    pub law: Law,
+    /// The equations it enters.
+    pub into: Vec<(UnknownId, f64)>,
+    /// An exponential junction: Newton limits its voltage (first unknown minus second; `None` is ground).
+    pub junction: Option<Junction>,
+}
+
+/// What Newton's method must know to limit an exponential.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Junction {
+    /// Anode and cathode; `None` is ground.
+    pub across: [Option<UnknownId>; 2],
+    /// n·Vt.
+    pub thermal: f64,
+    /// The voltage above which limiting begins, n·Vt·ln(n·Vt/(√2·Is)).
+    pub critical: f64,
+}
+
+/// A term of b: an independent source enters the *right-hand side* of each equation of `into` with its factor.
+#[derive(Clone, Debug)]
+pub struct SourceStamp {
+    /// The device.
+    pub device: DeviceId,
+    /// The function of time.
+    pub waveform: Waveform,
+    /// The equations it enters.
+    pub into: Vec<(UnknownId, f64)>,
+}
+
+/// A two-state mode with hysteresis: becomes 1 when `control` rises through `on`, 0 when it falls through `off`.
+#[derive(Clone, Debug)]
+pub struct Mode {
+    /// The device.
+    pub device: DeviceId,
+    /// The controlling quantity.
+    pub control: Law,
+    /// Upper threshold.
+    pub on: f64,
+    /// Lower threshold; `off <= on`.
+    pub off: f64,
+    /// Its state at the start where the card says so; else by `control` (1 above `on`, else 0).
+    pub initial: Option<bool>,
+}
+
+/// All that a circuit comes down to.
+#[derive(Clone, Debug, Default)]
+pub struct Stamps {
+    /// Unknowns, and with them the equations.
+    pub unknowns: Vec<Unknown>,
+    /// Number of node voltages; branch currents follow.
+    pub nodes: usize,
+    /// Entries of G; equal places add up.
+    pub conductances: Vec<(UnknownId, UnknownId, f64)>,
+    /// Charges and fluxes.
+    pub charges: Vec<Charge>,
+    /// Non-linear terms.
+    pub laws: Vec<LawStamp>,
+    /// Independent sources.
+    pub sources: Vec<SourceStamp>,
+    /// Modes.
+    pub modes: Vec<Mode>,
+    /// Output columns: name and value.
+    pub outputs: Vec<(String, Law)>,
+}

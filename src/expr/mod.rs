@@ -1,0 +1,10 @@
+//! One expression language, shared by `.bg` files and netlists.
+//!
+//! A tree is generic over its leaves: each stage of the river has its own kind of leaf (a name with a span; a bond's
+//! effort; a node's voltage), and going from one stage to the next is [`Expr::try_map`].
+
+pub mod functions;
+pub mod tree;
+
+pub use functions::{FUNCTIONS, Function};
+pub use tree::{Binary, Expr, Node, Table, Unary};

@@ -1,0 +1,5 @@
+//! The `bondspice` command.
+
+fn main() -> std::process::ExitCode {
+    bondspice::cli::main()
+}

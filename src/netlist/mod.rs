@@ -1,0 +1,232 @@
+//! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
+
+use crate::expr;
+use crate::source::Span;
+use std::collections::HashMap;
+
+/// An interned name. SPICE folds case: names that differ only in case are one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Name(pub u32);
+
+/// The names of a netlist, spelled as first seen.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    spelled: Vec<String>,
+    folded: HashMap<String, Name>,
+}
+
+impl Names {
+    /// The name of a text.
+    pub fn intern(&mut self, text: &str) -> Name {
+        let folded = text.to_lowercase();
+        if let Some(name) = self.folded.get(&folded) {
+            return *name;
+        }
+        let name = Name(self.spelled.len() as u32);
+        self.spelled.push(text.to_string());
+        self.folded.insert(folded, name);
+        name
+    }
+
+    /// The name of a text that has been seen before.
+    pub fn find(&self, text: &str) -> Option<Name> {
+        self.folded.get(&text.to_lowercase()).copied()
+    }
+
+    /// How a name was first spelled.
+    pub fn text(&self, name: Name) -> &str {
+        &self.spelled[name.0 as usize]
+    }
+}
+
+/// An expression of a netlist.
+pub type Expr = expr::Expr<Leaf>;
+
+/// What an expression of a netlist may speak of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Leaf {
+    /// A parameter.
+    Parameter(Name),
+    /// v(a) or v(a, b); ground is the name `0`.
+    Voltage(Name, Option<Name>),
+    /// i(device).
+    Current(Name),
+    /// Time in seconds.
+    Time,
+}
+
+/// A card and the place that it came from: its line in the netlist, or in the `.bg` file for one that was translated.
+#[derive(Clone, Debug)]
+pub struct Card {
+    /// What it says.
+    pub kind: CardKind,
+    /// Where it comes from.
+    pub span: Span,
+    /// A comment at the end of its line, without the marker: `eha.bg:41  R:eta`.
+    pub comment: Option<String>,
+}
+
+/// What cards say.
+#[derive(Clone, Debug)]
+pub enum CardKind {
+    /// A device or an instance.
+    Device(Device),
+    /// `.param`.
+    Parameters(Vec<(Name, Expr)>),
+    /// `.subckt … .ends`.
+    Subcircuit(Subcircuit),
+    /// `.model name type (…)`; keys are folded to lower case.
+    Model {
+        /// Its name.
+        name: Name,
+        /// `d`, `sw`, `csw`, folded to lower case.
+        kind: String,
+        /// Its parameters.
+        parameters: Vec<(String, Expr)>,
+    },
+    /// `.options`; a flag has the value `1`. Keys are folded to lower case.
+    Options(Vec<(String, String)>),
+    /// `.ic v(node) = value`.
+    Initial(Vec<(Name, Expr)>),
+    /// `.save` or `.print tran`: the items as written and read.
+    Save {
+        /// Whether it was `.print`.
+        print: bool,
+        /// As written, and what it means.
+        items: Vec<(String, Expr)>,
+    },
+    /// `.tran step stop [start [hmax]] [uic]`.
+    #[allow(missing_docs)]
+    Transient { step: Expr, stop: Expr, start: Option<Expr>, hmax: Option<Expr>, uic: bool },
+    /// `.op`.
+    OperatingPoint,
+    /// A whole-line comment, without the asterisk.
+    Comment(String),
+}
+
+/// `.subckt` to `.ends`.
+#[derive(Clone, Debug)]
+pub struct Subcircuit {
+    /// Its name.
+    pub name: Name,
+    /// Its terminals.
+    pub ports: Vec<Name>,
+    /// Its parameters with their defaults.
+    pub parameters: Vec<(Name, Expr)>,
+    /// Its body.
+    pub cards: Vec<Card>,
+}
+
+/// A device card.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// Its name with its letter.
+    pub name: Name,
+    /// Its nodes, without controlling ones.
+    pub nodes: Vec<Name>,
+    /// What it is.
+    pub element: Element,
+}
+
+/// What device cards say.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub enum Element {
+    Resistor {
+        value: Expr,
+    },
+    Capacitor {
+        value: Expr,
+        initial: Option<Expr>,
+    },
+    Inductor {
+        value: Expr,
+        initial: Option<Expr>,
+    },
+    Mutual {
+        inductors: Vec<Name>,
+        coupling: Expr,
+    },
+    VoltageSource(Waveform),
+    CurrentSource(Waveform),
+    Vcvs {
+        gain: Expr,
+        control: [Name; 2],
+    },
+    Vccs {
+        gain: Expr,
+        control: [Name; 2],
+    },
+    Cccs {
+        gain: Expr,
+        control: Name,
+    },
+    Ccvs {
+        gain: Expr,
+        control: Name,
+    },
+    /// `B … V=`, `E … VALUE={}`.
+    BehaviouralVoltage {
+        law: Expr,
+    },
+    /// `B … I=`, `G … VALUE={}`.
+    BehaviouralCurrent {
+        law: Expr,
+    },
+    Switch {
+        model: Name,
+        control: [Name; 2],
+        on: Option<bool>,
+    },
+    CurrentSwitch {
+        model: Name,
+        control: Name,
+        on: Option<bool>,
+    },
+    Diode {
+        model: Name,
+        area: Option<Expr>,
+    },
+    Instance {
+        subcircuit: Name,
+        parameters: Vec<(Name, Expr)>,
+    },
+}
+
+/// The value of an independent source.
+#[derive(Clone, Debug)]
+pub enum Waveform {
+    /// DC, or a bare value.
+    Constant(Expr),
+    /// `PULSE( … )`, `SIN( … )`, `PWL( … )`, `EXP( … )`, `SFFM( … )`: arguments as written.
+    Function {
+        /// Which; all rows are in [`read::WAVEFORMS`].
+        shape: Shape,
+        /// Its arguments in order.
+        arguments: Vec<Expr>,
+    },
+}
+
+/// Waveform functions of SPICE.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Shape {
+    Pulse,
+    Sin,
+    Pwl,
+    Exp,
+    Sffm,
+}
+
+/// A netlist.
+#[derive(Clone, Debug, Default)]
+pub struct Netlist {
+    /// The first line.
+    pub title: String,
+    /// Its names.
+    pub names: Names,
+    /// `*bondspice key=value` comments, in order; keys may repeat.
+    pub header: Vec<(String, String)>,
+    /// Its cards, in order.
+    pub cards: Vec<Card>,
+}

@@ -1,0 +1,1 @@
+//! The second route: the bond graph's own equations, integrated without any circuit.

@@ -1,0 +1,1 @@
+//! BondGraph + Causality → Netlist + map.
