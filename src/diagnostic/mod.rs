@@ -2,6 +2,8 @@
 //!
 //! Nothing is thrown: each stage pushes onto a `Vec<Diagnostic>` and goes on as far as it can.
 
+pub mod codes;
+
 use crate::source::Span;
 
 /// How bad it is.

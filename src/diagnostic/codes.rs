@@ -1,0 +1,87 @@
+//! Every code of a diagnostic, one row each: what it means in a line, and what to do about it.
+//!
+//! Codes are stable: a row may be reworded, never renumbered. The hundreds say the stage, and with it the exit code:
+//!
+//! | codes | stage | exit code |
+//! |---|---|---|
+//! | 01 | characters and syntax | 3 |
+//! | 02 | names and language | 3 |
+//! | 03 | units and domains | 3 |
+//! | 04 | structure of the graph, causality | 3 |
+//! | 05 | initial values, the graph's equations | 3 |
+//! | 06 | translation | 3 |
+//! | 07 | netlists and circuits | 3 |
+//! | 08 | simulation | 4 |
+//! | 0900-0919 | files | 5 |
+//! | 0920-0939 | data files: traces, maps, lists of times | 3 |
+//! | 0940-0999 | usage | 2 |
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Code {
+    /// `E0101`; E errors, W warnings, N notes.
+    pub code: &'static str,
+    /// What it means, in a line.
+    pub title: &'static str,
+    /// Why it arises and how to mend it.
+    pub explanation: &'static str,
+}
+
+const fn row(code: &'static str, title: &'static str, explanation: &'static str) -> Code {
+    Code { code, title, explanation }
+}
+
+/// Every code, one row a line, each stage's rows in order (E, then W, then N).
+#[rustfmt::skip]
+pub const CODES: &[Code] = &[
+    // -- 01: characters and syntax
+    row("E0191", "text is not UTF-8", "Sources are UTF-8. Save the file as UTF-8; the message says at which byte the first bad one stands."),
+    row("E0192", "file is binary", "The file holds zero bytes, so it is no source text. RAW files are results: read them with `bondspice trace` or `bondspice compare`."),
+    row("E0193", "file is empty", "There is nothing in the file but blanks. A bond graph needs at least two ports joined by a bond, a netlist a title and a device."),
+    // -- 02: names and language
+    // -- 03: units and domains
+    // -- 04: structure of the graph, causality
+    // -- 05: initial values, the graph's equations
+    // -- 06: translation
+    // -- 07: netlists and circuits
+    // -- 08: simulation
+    // -- 09: files and usage
+    row("E0901", "no such file", "The file named does not exist. The message names the nearest one in the same folder."),
+    row("E0902", "file cannot be read", "The system refused to read the file; its reason stands in the message."),
+    row("E0903", "not a file", "A folder was named where a file is needed."),
+    row("E0904", "file is too large", "Sources are limited to 1 GiB, so that places in them fit into 32 bits."),
+    row("E0905", "file cannot be written", "The system refused to write the file; its reason stands in the message. Nothing is left half written: the old file, if there was one, is untouched."),
+    row("E0906", "output would overwrite an input", "An output may not have the name of a file that was read. Choose another name after -o or --map."),
+];
+
+/// The row of a code.
+pub fn find(code: &str) -> Option<&'static Code> {
+    CODES.iter().find(|row| row.code == code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The order of the table: by stage, then E, W, N, then number.
+    fn key(code: &str) -> (&str, usize, &str) {
+        (&code[1..3], "EWN".find(&code[..1]).unwrap(), &code[3..])
+    }
+
+    #[test]
+    fn codes_are_well_formed_unique_and_sorted() {
+        for row in CODES {
+            assert!(row.code.len() == 5 && "EWN".contains(&row.code[..1]), "{}", row.code);
+            assert!(row.code[1..].bytes().all(|b| b.is_ascii_digit()), "{}", row.code);
+            assert!(!row.title.is_empty() && row.explanation.ends_with('.'), "{}", row.code);
+        }
+        for pair in CODES.windows(2) {
+            assert!(
+                key(pair[0].code) < key(pair[1].code),
+                "{} before {}",
+                pair[0].code,
+                pair[1].code
+            );
+        }
+    }
+}
