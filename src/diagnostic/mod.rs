@@ -3,6 +3,8 @@
 //! Nothing is thrown: each stage pushes onto a `Vec<Diagnostic>` and goes on as far as it can.
 
 pub mod codes;
+pub mod files;
+pub mod render;
 
 use crate::source::Span;
 

@@ -3,6 +3,8 @@
 //! A [`Span`] travels from the text that a user wrote to the last equation of the solver, so that every failure can
 //! point at a line.
 
+pub mod loader;
+
 /// Index of a file in a [`SourceMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FileId(pub u32);

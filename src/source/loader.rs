@@ -1,0 +1,245 @@
+//! Reading files and standard input: the only place of the project that does.
+//!
+//! A text must be UTF-8 without zero bytes and at most [`LIMIT`] bytes long, so that places in it fit into 32 bits.
+
+use super::{FileId, SourceMap, Span};
+use std::io::Read;
+use std::path::Path;
+
+/// The largest text that is read, in bytes.
+pub const LIMIT: u64 = 1 << 30;
+
+/// The largest file of results that is read, in bytes.
+pub const DATA_LIMIT: u64 = 1 << 34;
+
+/// Why a file could not be read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadError {
+    /// The file as the user named it.
+    pub name: String,
+    /// What went wrong.
+    pub kind: LoadErrorKind,
+}
+
+/// What can go wrong while reading; the first four are the file's, the others its content's.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadErrorKind {
+    /// Nothing has this name; a file of a similar one stands beside it.
+    Missing {
+        /// The similar name.
+        nearest: Option<String>,
+    },
+    /// A folder.
+    Folder,
+    /// The system's reason.
+    Unreadable(String),
+    /// More bytes than the limit.
+    TooLarge {
+        /// The limit.
+        limit: u64,
+    },
+    /// A byte that UTF-8 forbids.
+    NotUtf8 {
+        /// Which.
+        offset: usize,
+        /// Its place in the text as shown.
+        span: Span,
+    },
+    /// A zero byte.
+    Binary {
+        /// Which.
+        offset: usize,
+        /// Its place in the text as shown.
+        span: Span,
+    },
+    /// Nothing but blanks.
+    Empty {
+        /// Its beginning.
+        span: Span,
+    },
+}
+
+/// Reads a text into the map; `-` is standard input.
+///
+/// # Errors
+/// Says why the file could not be read; a bad text is in the map nevertheless, so that its place can be shown.
+pub fn load(path: &str, map: &mut SourceMap) -> Result<FileId, LoadError> {
+    let bytes = read_bytes(path, LIMIT)?;
+    let name = if path == "-" { "<stdin>" } else { path };
+    decode(name, bytes, map)
+}
+
+/// Takes a text that is in memory already, under the rules of [`load`].
+///
+/// # Errors
+/// Says why the text cannot be taken.
+pub fn decode(name: &str, bytes: Vec<u8>, map: &mut SourceMap) -> Result<FileId, LoadError> {
+    let fail = |kind| Err(LoadError { name: name.to_string(), kind });
+    let bytes = match bytes.strip_prefix(b"\xEF\xBB\xBF") {
+        Some(rest) => rest.to_vec(),
+        None => bytes,
+    };
+    if let Some(offset) = bytes.iter().position(|byte| *byte == 0) {
+        let span = show(name, &bytes, offset, map);
+        return fail(LoadErrorKind::Binary { offset, span });
+    }
+    match String::from_utf8(bytes) {
+        Ok(text) => {
+            let empty = text.trim().is_empty();
+            let file = map.add(name, text);
+            if empty {
+                return fail(LoadErrorKind::Empty { span: Span::new(file, 0, 0) });
+            }
+            Ok(file)
+        }
+        Err(error) => {
+            let offset = error.utf8_error().valid_up_to();
+            let span = show(name, error.as_bytes(), offset, map);
+            fail(LoadErrorKind::NotUtf8 { offset, span })
+        }
+    }
+}
+
+/// Reads a whole file of data; `-` is standard input.
+///
+/// # Errors
+/// Says why the file could not be read.
+pub fn read_data(path: &str) -> Result<Vec<u8>, LoadError> {
+    read_bytes(path, DATA_LIMIT)
+}
+
+fn read_bytes(path: &str, limit: u64) -> Result<Vec<u8>, LoadError> {
+    let fail = |kind| LoadError { name: path.to_string(), kind };
+    let unreadable = |error: std::io::Error| fail(LoadErrorKind::Unreadable(reason(&error)));
+    let mut bytes = vec![];
+    if path == "-" {
+        let name = "<stdin>".to_string();
+        std::io::stdin().lock().take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        if bytes.len() as u64 > limit {
+            return Err(LoadError { name, kind: LoadErrorKind::TooLarge { limit } });
+        }
+        return Ok(bytes);
+    }
+    let file = std::fs::File::open(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => fail(LoadErrorKind::Missing { nearest: nearest(path) }),
+        _ => unreadable(error),
+    })?;
+    let metadata = file.metadata().map_err(unreadable)?;
+    if metadata.is_dir() {
+        return Err(fail(LoadErrorKind::Folder));
+    }
+    if metadata.len() > limit {
+        return Err(fail(LoadErrorKind::TooLarge { limit }));
+    }
+    file.take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > limit {
+        return Err(fail(LoadErrorKind::TooLarge { limit }));
+    }
+    Ok(bytes)
+}
+
+/// A system error without Rust's `(os error 2)`.
+pub fn reason(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    let text = text.split(" (os error").next().unwrap_or(&text);
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// Puts the text around a bad byte into the map, its line being the last, and returns the byte's place there.
+fn show(name: &str, bytes: &[u8], offset: usize, map: &mut SourceMap) -> Span {
+    // What follows the line is of no use and may be anything; what stands before keeps line numbers right.
+    let end = bytes[offset..].iter().take(200).position(|b| *b == b'\n').unwrap_or(200);
+    let before = String::from_utf8_lossy(&bytes[..offset]).into_owned();
+    let after = String::from_utf8_lossy(&bytes[offset..bytes.len().min(offset + end)]).into_owned();
+    let width = after.chars().next().map_or(0, char::len_utf8);
+    let start = before.len();
+    let file = map.add(name, before + &after);
+    Span::new(file, start, start + width)
+}
+
+/// The file beside a missing one whose name is most like it.
+fn nearest(path: &str) -> Option<String> {
+    let path = Path::new(path);
+    let wanted = path.file_name()?.to_str()?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut best: Option<(usize, String)> = None;
+    for entry in std::fs::read_dir(folder).ok()?.take(10_000).flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let distance = edit_distance(wanted, &name);
+        let better = best.as_ref().is_none_or(|(d, n)| (distance, &name) < (*d, n));
+        if distance <= wanted.chars().count() / 3 && better {
+            best = Some((distance, name));
+        }
+    }
+    let (_, name) = best?;
+    Some(match path.parent().filter(|p| !p.as_os_str().is_empty()) {
+        Some(parent) => parent.join(name).to_string_lossy().into_owned(),
+        None => name,
+    })
+}
+
+/// The number of single-letter changes, insertions and deletions between two words, without regard to case
+/// (Levenshtein).
+pub fn edit_distance(a: &str, b: &str) -> usize {
+    let a: Vec<char> = a.to_lowercase().chars().collect();
+    let b: Vec<char> = b.to_lowercase().chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let changed = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_keeps_its_bytes_but_the_byte_order_mark() {
+        let mut map = SourceMap::default();
+        let file = decode("a", b"\xEF\xBB\xBFSe:U".to_vec(), &mut map).unwrap();
+        assert_eq!(map.file(file).unwrap().text, "Se:U");
+    }
+
+    #[test]
+    fn bad_bytes_are_named_with_their_place() {
+        let mut map = SourceMap::default();
+        let error = decode("a", b"1:x\n  \xFF -> 0:y\nmore".to_vec(), &mut map).unwrap_err();
+        let LoadErrorKind::NotUtf8 { offset: 6, span } = error.kind else { panic!("{error:?}") };
+        assert_eq!(map.position(span), Some((2, 3)));
+        let error = decode("b", b"\x7fELF\x00\x01".to_vec(), &mut map).unwrap_err();
+        assert!(matches!(error.kind, LoadErrorKind::Binary { offset: 4, .. }), "{error:?}");
+        let error = decode("c", b" \n\t\n".to_vec(), &mut map).unwrap_err();
+        assert!(matches!(error.kind, LoadErrorKind::Empty { .. }), "{error:?}");
+    }
+
+    #[test]
+    fn missing_files_and_folders_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("actuator.bg"), "Se:U").unwrap();
+        let name = |file: &str| folder.path().join(file).to_string_lossy().into_owned();
+        let mut map = SourceMap::default();
+        let error = load(&name("actuater.bg"), &mut map).unwrap_err();
+        let nearest = Some(name("actuator.bg"));
+        assert_eq!(error.kind, LoadErrorKind::Missing { nearest });
+        let error = load(&name("zebra.cir"), &mut map).unwrap_err();
+        assert_eq!(error.kind, LoadErrorKind::Missing { nearest: None });
+        let error = load(&name(""), &mut map).unwrap_err();
+        assert_eq!(error.kind, LoadErrorKind::Folder);
+        assert!(load(&name("actuator.bg"), &mut map).is_ok());
+    }
+
+    #[test]
+    fn edit_distances() {
+        for (a, b, distance) in [("", "abc", 3), ("Flow", "flaw", 1), ("kitten", "sitting", 3)] {
+            assert_eq!(edit_distance(a, b), distance, "{a} {b}");
+        }
+    }
+}
