@@ -1,0 +1,60 @@
+//! The nearest name: what somebody probably meant.
+
+/// The candidate nearest to `name` by edit distance, when it is near enough to be a likely slip; letters that differ
+/// only in case, and two neighbours swapped, count less. The first of several equally near ones.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let letters: Vec<char> = name.chars().take(64).collect();
+    let limit = 2 * letters.len().div_ceil(3).clamp(1, 3);
+    candidates
+        .into_iter()
+        .filter(|candidate| *candidate != name)
+        .map(|candidate| (distance(&letters, candidate), candidate))
+        .filter(|(distance, candidate)| {
+            // A name of one or two letters has everything near it: there only a slip of case counts.
+            *distance <= limit
+                && (*distance == 1 || candidate.chars().count().max(letters.len()) > 2)
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Twice the edit distance (optimal string alignment), a change of case counting one half.
+fn distance(a: &[char], b: &str) -> usize {
+    let b: Vec<char> = b.chars().take(64).collect();
+    let mut before = vec![0; b.len() + 1];
+    let mut last: Vec<usize> = (0..=b.len()).map(|j| 2 * j).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![2 * i; b.len() + 1];
+        for j in 1..=b.len() {
+            let change = if a[i - 1] == b[j - 1] {
+                0
+            } else if a[i - 1].to_lowercase().eq(b[j - 1].to_lowercase()) {
+                1
+            } else {
+                2
+            };
+            row[j] = (last[j - 1] + change).min(last[j] + 2).min(row[j - 1] + 2);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                row[j] = row[j].min(before[j - 2] + 2);
+            }
+        }
+        before = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn likely_slips() {
+        let names = ["armature", "shaft", "pump_port", "L", "rod"];
+        assert_eq!(nearest("armatre", names), Some("armature"));
+        assert_eq!(nearest("pumpport", names), Some("pump_port"));
+        assert_eq!(nearest("l", names), Some("L"));
+        assert_eq!(nearest("x", names), None);
+        assert_eq!(nearest("zzzzzz", names), None);
+        assert_eq!(nearest("rdo", names), Some("rod"));
+    }
+}
