@@ -13,6 +13,7 @@
 
 use super::{DeviceId, Waveform};
 use crate::expr;
+use crate::source::Span;
 
 /// Index of an unknown and of its equation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,6 +46,17 @@ pub struct Unknown {
     pub nominal: Option<f64>,
     /// The device whose branch it is, `None` for a node.
     pub device: Option<DeviceId>,
+    /// Where the node is first used, or the device's card.
+    pub span: Span,
+}
+
+/// What messages call a device, and where it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceLabel {
+    /// Its name as the netlist writes it.
+    pub name: String,
+    /// Its card.
+    pub span: Span,
 }
 
 /// A charge or flux Q = linear·x + law(x), whose rate enters equations.
@@ -131,4 +143,9 @@ pub struct Stamps {
     pub modes: Vec<Mode>,
     /// Output columns: name and value.
     pub outputs: Vec<(String, Law)>,
+    /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`), or held while
+    /// the operating point is sought.
+    pub initial: Vec<(UnknownId, f64)>,
+    /// Names and places, indexed by [`DeviceId`].
+    pub devices: Vec<DeviceLabel>,
 }
