@@ -52,6 +52,13 @@ pub const CODES: &[Code] = &[
     row("E0904", "file is too large", "Sources are limited to 1 GiB, so that places in them fit into 32 bits."),
     row("E0905", "file cannot be written", "The system refused to write the file; its reason stands in the message. Nothing is left half written: the old file, if there was one, is untouched."),
     row("E0906", "output would overwrite an input", "An output may not have the name of a file that was read. Choose another name after -o or --map."),
+    row("E0920", "not a trace", "The file is in none of the formats that traces are read from: CSV, RAW, JSON."),
+    row("E0921", "table cannot be read", "A table needs a header row and the same number of fields, all numbers, in each row."),
+    row("E0922", "RAW file cannot be read", "The file begins as a RAW file and does not go on as one. It may have been cut off."),
+    row("E0923", "JSON is no trace", "A trace in JSON is `{\"schema\": 1, \"names\": […], \"units\": […], \"columns\": [[…], …]}`, all columns of one length."),
+    row("E0924", "trace has no rows", "There is a header, or nothing at all, and no row of numbers."),
+    row("E0925", "two columns of one name", "Columns are told apart by their names. Give one of them another name with `as`."),
+    row("E0926", "time falls", "The first column of a trace must not decrease, and must hold numbers."),
 ];
 
 /// The row of a code.

@@ -1,5 +1,12 @@
 //! Traces: names, columns, formats, resampling, comparison.
 
+pub mod compare;
+pub mod resample;
+pub mod formats;
+pub mod csv;
+pub mod raw;
+pub mod json;
+
 /// Columns over a common abscissa.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -9,6 +16,42 @@ pub struct Trace {
     pub units: Vec<String>,
     /// One column for each name, all of one length.
     pub columns: Vec<Vec<f64>>,
+}
+
+impl Trace {
+    /// A trace without rows; units may be fewer than names.
+    pub fn new(names: Vec<String>, mut units: Vec<String>) -> Trace {
+        units.resize(names.len(), String::new());
+        let columns = vec![vec![]; names.len()];
+        Trace { names, units, columns }
+    }
+
+    /// The abscissa, mostly time in seconds; empty where there are no columns.
+    pub fn time(&self) -> &[f64] {
+        self.columns.first().map_or(&[], Vec::as_slice)
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time().len()
+    }
+
+    /// The column of a name; where none is spelled so, the only one that differs by case alone, as SPICE folds case.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.position(name).map(|at| self.columns[at].as_slice())
+    }
+
+    /// Where the column of a name stands; see [`Trace::column`].
+    pub fn position(&self, name: &str) -> Option<usize> {
+        let exact = self.names.iter().position(|other| other == name);
+        exact.or_else(|| {
+            let folded = name.to_lowercase();
+            let mut same =
+                (0..self.names.len()).filter(|at| self.names[*at].to_lowercase() == folded);
+            let only = same.next()?;
+            same.next().is_none().then_some(only)
+        })
+    }
 }
 
 /// Takes rows one by one while they are computed, so that a run needs no memory for them.

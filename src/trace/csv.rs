@@ -1,0 +1,154 @@
+//! Traces as CSV (RFC 4180): a header, one row a point, the shortest numbers that read back the same.
+
+use super::formats::{Heading, bad};
+use super::{Sink, Trace};
+use crate::diagnostic::Diagnostic;
+use std::io::{self, Write};
+
+/// Writes rows as they come.
+pub struct Rows<W: Write> {
+    writer: ::csv::Writer<W>,
+    digits: String,
+}
+
+impl<W: Write> Rows<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// What writing failed with.
+    pub fn new(to: W, heading: &Heading, names: &[String], units: &[String]) -> io::Result<Self> {
+        let mut writer = ::csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(to);
+        for (at, name) in names.iter().enumerate() {
+            match units.get(at) {
+                Some(unit) if heading.units && !unit.is_empty() => {
+                    writer.write_field(format!("{name} [{unit}]"))?;
+                }
+                _ => writer.write_field(name)?,
+            }
+        }
+        writer.write_record(None::<&[u8]>)?;
+        Ok(Rows { writer, digits: String::new() })
+    }
+
+    /// Writes what is still held back and gives the writer back.
+    ///
+    /// # Errors
+    /// What writing failed with.
+    pub fn finish(self) -> io::Result<W> {
+        self.writer.into_inner().map_err(|error| error.into_error())
+    }
+}
+
+impl<W: Write> Sink for Rows<W> {
+    fn row(&mut self, values: &[f64]) -> io::Result<()> {
+        for value in values {
+            self.digits.clear();
+            number(*value, &mut self.digits);
+            self.writer.write_field(&self.digits)?;
+        }
+        self.writer.write_record(None::<&[u8]>)?;
+        Ok(())
+    }
+}
+
+/// Appends the shortest decimal number that reads back as the same value.
+pub fn number(value: f64, text: &mut String) {
+    use std::fmt::Write;
+    let size = value.abs();
+    // Writing to a String cannot fail.
+    let _ = if value == 0.0 || !size.is_finite() || (1e-5..1e16).contains(&size) {
+        write!(text, "{value}")
+    } else {
+        write!(text, "{value:e}")
+    };
+}
+
+/// Writes a whole trace.
+pub fn write(trace: &Trace, heading: &Heading, to: &mut dyn Write) -> io::Result<()> {
+    let mut rows = Rows::new(to, heading, &trace.names, &trace.units)?;
+    let mut row = vec![0.0; trace.columns.len()];
+    for at in 0..trace.rows() {
+        for (value, column) in row.iter_mut().zip(&trace.columns) {
+            *value = column[at];
+        }
+        rows.row(&row)?;
+    }
+    rows.finish()?.flush()
+}
+
+/// Reads a trace; commas, semicolons or tabs separate, whichever the header holds.
+pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let header = bytes.split(|byte| *byte == b'\n').next().unwrap_or(bytes);
+    let separator = *b",;\t".iter().find(|byte| header.contains(byte)).unwrap_or(&b',');
+    let mut reader = ::csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .trim(::csv::Trim::All)
+        .from_reader(bytes);
+    let mut record = ::csv::StringRecord::new();
+    let mut next = |record: &mut ::csv::StringRecord| {
+        reader.read_record(record).map_err(|error| match error.position() {
+            Some(place) => bad("E0921", "the table is no text").because(at(place.line())),
+            None => bad("E0921", format!("the table cannot be read: {error}")),
+        })
+    };
+    if !next(&mut record)? {
+        return Err(bad("E0924", "the trace has no rows"));
+    }
+    let (names, units) = record.iter().map(split_unit).unzip();
+    let mut trace = Trace::new(names, units);
+    let width = trace.names.len();
+    while next(&mut record)? {
+        let line = record.position().map_or(0, ::csv::Position::line);
+        if record.len() != width {
+            let message = format!("a row has {} fields, the header {width}", record.len());
+            return Err(bad("E0921", message).because(at(line)));
+        }
+        for (field, (column, name)) in record.iter().zip(trace.columns.iter_mut().zip(&trace.names))
+        {
+            let value: f64 = field.parse().map_err(|_| {
+                bad("E0921", format!("`{field}` is no number"))
+                    .because(format!("{}, column `{name}`", at(line)))
+            })?;
+            column.push(value);
+        }
+    }
+    Ok(trace)
+}
+
+fn at(line: u64) -> String {
+    format!("at line {line}")
+}
+
+/// `name [unit]` into its parts.
+fn split_unit(head: &str) -> (String, String) {
+    let parts = head.strip_suffix(']').and_then(|rest| rest.rsplit_once(" ["));
+    match parts {
+        Some((name, unit)) => (name.to_string(), unit.to_string()),
+        None => (head.to_string(), String::new()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_it_looks() {
+        let trace = super::super::formats::tests::awkward();
+        let mut bytes = vec![];
+        let heading = Heading { units: true, ..Heading::default() };
+        write(&trace, &heading, &mut bytes).unwrap();
+        insta::assert_snapshot!(String::from_utf8(bytes).unwrap());
+    }
+
+    #[test]
+    fn semicolons_and_tabs_are_read_too() {
+        for text in ["time;x\n0;1.5\n", "time\tx\n0\t1.5\n", "time, x\r\n0, 1.5\r\n"] {
+            let trace = read(text.as_bytes()).unwrap();
+            assert_eq!(trace.column("x"), Some(&[1.5][..]), "{text}");
+        }
+    }
+}
