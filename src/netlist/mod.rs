@@ -1,5 +1,7 @@
 //! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
 
+pub mod header;
+
 use crate::expr;
 use crate::source::Span;
 use std::collections::HashMap;
