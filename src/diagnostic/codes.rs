@@ -35,10 +35,15 @@ const fn row(code: &'static str, title: &'static str, explanation: &'static str)
 #[rustfmt::skip]
 pub const CODES: &[Code] = &[
     // -- 01: characters and syntax
+    row("E0110", "nested too deeply", "Brackets, conditionals and operations within one another have a limit, so that no text can exhaust the memory of the tool. Name a part of the expression as a parameter or a signal."),
+    row("E0111", "form of argument not allowed here", "Functions take plain values separated by commas; `;`, `name =` and arrows belong to other forms."),
+    row("E0112", "wrong number of arguments", "The function takes another number of arguments than were given."),
+    row("E0113", "comparisons do not chain", "`a < b < c` would compare the truth of `a < b` with c. Write `a < b and b < c`."),
     row("E0191", "text is not UTF-8", "Sources are UTF-8. Save the file as UTF-8; the message says at which byte the first bad one stands."),
     row("E0192", "file is binary", "The file holds zero bytes, so it is no source text. RAW files are results: read them with `bondspice trace` or `bondspice compare`."),
     row("E0193", "file is empty", "There is nothing in the file but blanks. A bond graph needs at least two ports joined by a bond, a netlist a title and a device."),
     // -- 02: names and language
+    row("E0210", "unknown function", "No function has this name; names in `.bg` files are case-sensitive. The message names the nearest one."),
     // -- 03: units and domains
     // -- 04: structure of the graph, causality
     // -- 05: initial values, the graph's equations

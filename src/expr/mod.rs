@@ -3,8 +3,13 @@
 //! A tree is generic over its leaves: each stage of the river has its own kind of leaf (a name with a span; a bond's
 //! effort; a node's voltage), and going from one stage to the next is [`Expr::try_map`].
 
-pub mod functions;
 pub mod tree;
+pub mod functions;
+pub mod evaluate;
+pub mod parse;
+#[cfg(test)]
+mod tests;
 
-pub use functions::{FUNCTIONS, Function};
+pub use crate::__expression_roles as roles;
+pub use functions::{Dialect, FUNCTIONS, Function};
 pub use tree::{Binary, Expr, Node, Table, Unary};

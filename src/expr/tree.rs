@@ -69,6 +69,9 @@ pub struct Table {
     pub y: Vec<f64>,
 }
 
+/// What puts a tree in the place of each leaf.
+pub type LeafMap<'a, L, M, E> = &'a mut dyn FnMut(&L, Span) -> Result<Expr<M>, E>;
+
 impl<L> Expr<L> {
     /// A node at a place.
     pub fn new(node: Node<L>, span: Span) -> Expr<L> {
@@ -102,6 +105,30 @@ impl<L> Expr<L> {
         Expr::new(Node::Call(function, arguments), Span::NONE)
     }
 
+    /// `if condition then … else …`, generated.
+    pub fn choice(condition: Expr<L>, then: Expr<L>, otherwise: Expr<L>) -> Expr<L> {
+        Expr::new(Node::If(condition, then, otherwise), Span::NONE)
+    }
+
+    /// The number of levels of the tree.
+    pub fn depth(&self) -> usize {
+        let mut deepest = 0;
+        let mut open = vec![(self, 1)];
+        while let Some((expr, level)) = open.pop() {
+            deepest = deepest.max(level);
+            match &*expr.node {
+                Node::Number(_) | Node::Leaf(_) => {}
+                Node::Unary(_, a) | Node::Table(a, _) => open.push((a, level + 1)),
+                Node::Binary(_, a, b) => open.extend([(a, level + 1), (b, level + 1)]),
+                Node::Call(_, arguments) => open.extend(arguments.iter().map(|a| (a, level + 1))),
+                Node::If(c, a, b) => {
+                    open.extend([(c, level + 1), (a, level + 1), (b, level + 1)]);
+                }
+            }
+        }
+        deepest
+    }
+
     /// The value of a literal.
     pub fn as_number(&self) -> Option<f64> {
         match &*self.node {
@@ -111,10 +138,7 @@ impl<L> Expr<L> {
     }
 
     /// The same tree with each leaf replaced by a tree; the first error ends it.
-    pub fn try_map<M, E>(
-        &self,
-        leaf: &mut dyn FnMut(&L, Span) -> Result<Expr<M>, E>,
-    ) -> Result<Expr<M>, E> {
+    pub fn try_map<M, E>(&self, leaf: LeafMap<'_, L, M, E>) -> Result<Expr<M>, E> {
         let node = match &*self.node {
             Node::Number(value) => Node::Number(*value),
             Node::Leaf(name) => return leaf(name, self.span),
@@ -156,5 +180,30 @@ impl<L> Expr<L> {
                 b.leaves(visit);
             }
         }
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident $method:ident $op:ident) => {
+        /// Generated.
+        impl<L> std::ops::$trait for Expr<L> {
+            type Output = Expr<L>;
+            fn $method(self, other: Expr<L>) -> Expr<L> {
+                self.binary(Binary::$op, other)
+            }
+        }
+    };
+}
+
+operator!(Add add Add);
+operator!(Sub sub Subtract);
+operator!(Mul mul Multiply);
+operator!(Div div Divide);
+
+/// Generated.
+impl<L> std::ops::Neg for Expr<L> {
+    type Output = Expr<L>;
+    fn neg(self) -> Expr<L> {
+        self.negate()
     }
 }

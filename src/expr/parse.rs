@@ -1,0 +1,547 @@
+//! From the pairs of the shared grammar `grammar/expression.pest` to an [`Expr`].
+//!
+//! A language (`.bg`, netlists) derives a parser from the shared grammar and its own, and tells here what its rules
+//! are and what its atoms mean:
+//!
+//! ```ignore
+//! impl Language for Netlist<'_> {
+//!     type Rule = Rule;
+//!     type Leaf = netlist::Leaf;
+//!     const DIALECT: Dialect = Dialect::Ngspice;
+//!     expr::roles!(Rule);
+//!     fn span(&self, span: pest::Span<'_>) -> Span { Span::new(self.file, span.start() + self.offset, …) }
+//!     fn atom(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr<Leaf>> { … }
+//!     fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr<Leaf>> { … }
+//! }
+//! let mut pairs = Parser::parse(Rule::expression, text)?;    // after parse::nesting(text) has passed
+//! let expr = parse::expression(&mut language, pairs.next()?, diagnostics);
+//! ```
+//!
+//! `atom` gets every `number`, `reference` and `special` pair. `call` gets each call whose name is not in the table of
+//! functions, as the raw pair: first the `function_name`, then the arguments as the grammar's own `argument` gave them
+//! (those that are plain have the role [`Role::Expression`] and go through [`expression`] again), and a `row_break`
+//! for each `;`. When it knows no such function either, it pushes [`unknown_function`].
+//!
+//! Depth. The text is checked for nesting before pest runs ([`nesting`]); chains of one precedence
+//! (`a + b + c + …`, however long) become balanced trees; what is deeper than [`MAX_DEPTH`] all the same is refused.
+//! So no later stage that walks a tree can overflow its stack.
+
+use super::functions::{self, Dialect, Function, Meaning, Slot, Template};
+use super::tree::{Binary, Expr, Node, Unary};
+use crate::diagnostic::Diagnostic;
+use crate::source::Span;
+use pest::RuleType;
+use pest::iterators::Pair;
+
+/// Brackets and conditions within one another, at most.
+pub const MAX_NESTING: usize = 200;
+
+/// Levels of a tree, at most.
+pub const MAX_DEPTH: usize = 1000;
+
+/// Chains of one precedence up to this length keep the order of the text; longer ones are balanced.
+const LONG_CHAIN: usize = 32;
+
+/// What a grammar's rule is to expressions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The rule `expression`.
+    Expression,
+    /// The rule `conditional`.
+    Conditional,
+    /// The rule `call`.
+    Call,
+    /// An operator between operands, or the same sign before one.
+    Infix(Binary),
+    /// `not`.
+    Not,
+    /// `?` and `:`, `if`, `then`, `else`.
+    Word,
+    /// `;` between arguments.
+    RowBreak,
+    /// Anything else: the language's own.
+    Atom,
+}
+
+/// What the shared converter asks of a language; see the module's page.
+pub trait Language {
+    /// The derived parser's rules.
+    type Rule: RuleType;
+    /// Its leaves.
+    type Leaf: Clone;
+    /// Its names of functions, and what its `^` means.
+    const DIALECT: Dialect;
+    /// What a rule is; written by [`roles!`](crate::expr::roles).
+    fn role(rule: Self::Rule) -> Role;
+    /// Where a piece of the parsed text stands.
+    fn span(&self, span: pest::Span<'_>) -> Span;
+    /// The tree of a `number`, a `reference` or a special form. On an error, pushes it and gives `None`.
+    fn atom(
+        &mut self,
+        pair: Pair<'_, Self::Rule>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr<Self::Leaf>>;
+    /// The tree of a call that the table of functions does not know. On an error, pushes it and gives `None`.
+    fn call(
+        &mut self,
+        name: &str,
+        pair: Pair<'_, Self::Rule>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr<Self::Leaf>>;
+}
+
+/// Writes [`Language::role`] for a parser that includes `grammar/expression.pest`.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! __expression_roles {
+    ($rule:ident) => {
+        fn role(rule: $rule) -> $crate::expr::parse::Role {
+            use $crate::expr::{Binary, parse::Role};
+            match rule {
+                $rule::expression => Role::Expression,
+                $rule::conditional => Role::Conditional,
+                $rule::call => Role::Call,
+                $rule::op_plus => Role::Infix(Binary::Add),
+                $rule::op_minus => Role::Infix(Binary::Subtract),
+                $rule::op_times => Role::Infix(Binary::Multiply),
+                $rule::op_divide => Role::Infix(Binary::Divide),
+                $rule::op_power => Role::Infix(Binary::Power),
+                $rule::op_less => Role::Infix(Binary::Less),
+                $rule::op_less_equal => Role::Infix(Binary::LessEqual),
+                $rule::op_greater => Role::Infix(Binary::Greater),
+                $rule::op_greater_equal => Role::Infix(Binary::GreaterEqual),
+                $rule::op_equal => Role::Infix(Binary::Equal),
+                $rule::op_not_equal => Role::Infix(Binary::NotEqual),
+                $rule::op_and => Role::Infix(Binary::And),
+                $rule::op_or => Role::Infix(Binary::Or),
+                $rule::op_not => Role::Not,
+                $rule::question
+                | $rule::colon
+                | $rule::key_if
+                | $rule::key_then
+                | $rule::key_else => Role::Word,
+                $rule::row_break => Role::RowBreak,
+                _ => Role::Atom,
+            }
+        }
+    };
+}
+
+/// How tightly an operator binds; `not` and the unary minus are the gaps between.
+fn precedence(op: Binary) -> u8 {
+    match op {
+        Binary::Or => 1,
+        Binary::And => 2,
+        Binary::Equal
+        | Binary::NotEqual
+        | Binary::Less
+        | Binary::LessEqual
+        | Binary::Greater
+        | Binary::GreaterEqual => 4,
+        Binary::Add | Binary::Subtract => 5,
+        Binary::Multiply | Binary::Divide => 6,
+        Binary::Power => 8,
+    }
+}
+
+const NOT: u8 = 3;
+const SIGN: u8 = 7;
+
+/// Finds the first byte at which brackets, `if` or `?` stand deeper than [`MAX_NESTING`], for the language to refuse
+/// the text with [`too_deep`] before pest recurses into it. `comment` starts a comment that ends with the line.
+pub fn nesting(text: &str, comment: Option<u8>) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let (mut open, mut conditions, mut at) = (0usize, 0usize, 0usize);
+    let is_word = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80;
+    while at < bytes.len() {
+        match bytes[at] {
+            b'(' | b'[' | b'{' => open += 1,
+            b')' | b']' | b'}' => open = open.saturating_sub(1),
+            b'?' => conditions += 1,
+            b'\n' if open == 0 => conditions = 0,
+            byte if Some(byte) == comment => {
+                at += bytes[at..].iter().position(|b| *b == b'\n').unwrap_or(bytes.len() - at);
+                continue;
+            }
+            byte if is_word(byte) => {
+                let length =
+                    bytes[at..].iter().position(|b| !is_word(*b)).unwrap_or(bytes.len() - at);
+                conditions += usize::from(&bytes[at..at + length] == b"if");
+                at += length;
+                if open + conditions > MAX_NESTING {
+                    return Some(at - length);
+                }
+                continue;
+            }
+            _ => {}
+        }
+        if open + conditions > MAX_NESTING {
+            return Some(at);
+        }
+        at += 1;
+    }
+    None
+}
+
+/// The error for what is nested too deeply.
+pub fn too_deep(span: Span) -> Diagnostic {
+    Diagnostic::error("E0110", span, "nested too deeply")
+        .says("deeper than this is not read")
+        .because(format!("at most {MAX_NESTING} brackets and conditions, {MAX_DEPTH} operations within one another"))
+        .help("name a part of it as a parameter or a signal")
+}
+
+/// The error for a call of a function that nobody knows.
+pub fn unknown_function(name: &str, span: Span) -> Diagnostic {
+    let error = Diagnostic::error("E0210", span, format!("unknown function `{name}`"));
+    match functions::nearest(name) {
+        Some(nearest) => error.help(format!("did you mean `{nearest}`?")),
+        None => error,
+    }
+}
+
+/// The tree of an `expression` pair. `None` when anything within it was wrong; the errors are pushed.
+pub fn expression<L: Language>(
+    language: &mut L,
+    pair: Pair<'_, L::Rule>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Expr<L::Leaf>> {
+    convert(language, pair, d).map(|part| part.expr)
+}
+
+/// A tree with its depth.
+struct Part<L> {
+    expr: Expr<L>,
+    depth: usize,
+}
+
+enum Operator {
+    Infix(Binary),
+    Negate(Span),
+    Plus,
+    Not(Span),
+}
+
+impl Operator {
+    fn precedence(&self, dialect: Dialect) -> u8 {
+        match self {
+            Operator::Infix(op) => precedence(*op),
+            Operator::Negate(_) | Operator::Plus => SIGN,
+            // SPICE's `!` binds as tightly as a sign.
+            Operator::Not(_) => {
+                if dialect == Dialect::Bond {
+                    NOT
+                } else {
+                    SIGN
+                }
+            }
+        }
+    }
+}
+
+/// Operands and pending operators, the looser below the tighter.
+struct Stack<'d, L> {
+    dialect: Dialect,
+    operands: Vec<Part<L>>,
+    operators: Vec<Operator>,
+    diagnostics: &'d mut Vec<Diagnostic>,
+}
+
+fn convert<L: Language>(
+    language: &mut L,
+    pair: Pair<'_, L::Rule>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Part<L::Leaf>> {
+    let whole = language.span(pair.as_span());
+    let mut failed = false;
+    let mut branches = vec![];
+    let mut stack =
+        Stack { dialect: L::DIALECT, operands: vec![], operators: vec![], diagnostics: d };
+    let (mut after_operand, mut branching) = (false, false);
+    for part in pair.into_inner() {
+        let span = language.span(part.as_span());
+        let role = L::role(part.as_rule());
+        match role {
+            Role::Word => branching = true,
+            _ if branching => branches.push(part),
+            Role::Infix(op) if after_operand => {
+                failed |= stack.infix(op, span).is_none();
+                after_operand = false;
+            }
+            Role::Infix(Binary::Subtract) => stack.operators.push(Operator::Negate(span)),
+            Role::Infix(_) => stack.operators.push(Operator::Plus),
+            Role::Not => stack.operators.push(Operator::Not(span)),
+            _ => {
+                let operand = match role {
+                    Role::Expression => convert(language, part, stack.diagnostics),
+                    Role::Conditional => conditional(language, part, stack.diagnostics),
+                    Role::Call => call(language, part, stack.diagnostics),
+                    _ => language.atom(part, stack.diagnostics).map(measured),
+                };
+                failed |= operand.is_none();
+                stack.operands.push(operand.unwrap_or_else(|| measured(Expr::number(f64::NAN))));
+                after_operand = true;
+            }
+        }
+    }
+    failed |= stack.reduce(0).is_none();
+    let value = stack.operands.pop();
+    let d = stack.diagnostics;
+    let mut branches = branches.into_iter();
+    let value = match (branches.next(), branches.next()) {
+        (Some(then), Some(otherwise)) => {
+            let (then, otherwise) = (convert(language, then, d), convert(language, otherwise, d));
+            choice(value?, then?, otherwise?, whole, d)
+        }
+        _ => value,
+    };
+    value.filter(|_| !failed)
+}
+
+fn measured<L>(expr: Expr<L>) -> Part<L> {
+    Part { depth: expr.depth(), expr }
+}
+
+/// A node over parts, unless it gets too deep.
+fn join<L>(node: Node<L>, depth: usize, span: Span, d: &mut Vec<Diagnostic>) -> Option<Part<L>> {
+    if depth >= MAX_DEPTH {
+        d.push(too_deep(span));
+        return None;
+    }
+    Some(Part { expr: Expr::new(node, span), depth: depth + 1 })
+}
+
+fn choice<L>(
+    condition: Part<L>,
+    then: Part<L>,
+    otherwise: Part<L>,
+    span: Span,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Part<L>> {
+    let depth = condition.depth.max(then.depth).max(otherwise.depth);
+    join(Node::If(condition.expr, then.expr, otherwise.expr), depth, span, d)
+}
+
+fn conditional<L: Language>(
+    language: &mut L,
+    pair: Pair<'_, L::Rule>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Part<L::Leaf>> {
+    let span = language.span(pair.as_span());
+    let mut parts = vec![];
+    for part in pair.into_inner().filter(|p| L::role(p.as_rule()) == Role::Expression) {
+        parts.push(convert(language, part, d));
+    }
+    let mut parts = parts.into_iter().flatten();
+    let (condition, then, otherwise) = (parts.next()?, parts.next()?, parts.next()?);
+    choice(condition, then, otherwise, span, d)
+}
+
+fn call<L: Language>(
+    language: &mut L,
+    pair: Pair<'_, L::Rule>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Part<L::Leaf>> {
+    let span = language.span(pair.as_span());
+    let mut inner = pair.clone().into_inner();
+    let name = inner.next()?.as_str().trim_end();
+    let Some(meaning) = functions::find(L::DIALECT, name) else {
+        return language.call(name, pair.clone(), d).map(measured);
+    };
+    let mut arguments = vec![];
+    for argument in inner {
+        if L::role(argument.as_rule()) == Role::Expression {
+            arguments.push(convert(language, argument, d));
+        } else {
+            let place = language.span(argument.as_span());
+            d.push(Diagnostic::error(
+                "E0111",
+                place,
+                format!("`{name}` takes plain values, separated by commas"),
+            ));
+            arguments.push(None);
+        }
+    }
+    let arguments: Vec<_> = arguments.into_iter().collect::<Option<_>>()?;
+    let wanted = meaning.arguments();
+    let associative =
+        matches!(meaning, Meaning::Function(Function::Min | Function::Max)) && arguments.len() > 2;
+    if arguments.len() != wanted && !associative {
+        let plural = if wanted == 1 { "" } else { "s" };
+        d.push(
+            Diagnostic::error("E0112", span, format!("`{name}` takes {wanted} argument{plural}"))
+                .says(format!("{} given", arguments.len())),
+        );
+        return None;
+    }
+    match meaning {
+        Meaning::Function(function) if associative => {
+            let mut rest = arguments.into_iter();
+            let first = rest.next()?;
+            rest.try_fold(first, |left, right| {
+                let depth = left.depth.max(right.depth);
+                join(Node::Call(function, vec![left.expr, right.expr]), depth, span, d)
+            })
+        }
+        Meaning::Function(function) => {
+            let depth = arguments.iter().map(|a| a.depth).max().unwrap_or(0);
+            let arguments = arguments.into_iter().map(|a| a.expr).collect();
+            join(Node::Call(function, arguments), depth, span, d)
+        }
+        Meaning::Expansion { template, .. } => {
+            let template = template();
+            let depth = template.depth() + arguments.iter().map(|a| a.depth).max().unwrap_or(0);
+            if depth >= MAX_DEPTH {
+                d.push(too_deep(span));
+                return None;
+            }
+            let copies: Vec<_> = arguments.into_iter().map(|a| a.expr).collect();
+            let mut expr = substitute(&template, &copies);
+            expr.span = span;
+            Some(Part { expr, depth })
+        }
+    }
+}
+
+/// The template with its arguments put in.
+pub(super) fn substitute<L: Clone>(template: &Template, arguments: &[Expr<L>]) -> Expr<L> {
+    template.map(&mut |slot, _| match slot {
+        Slot::Argument(k) if *k < arguments.len() => arguments[*k].clone(),
+        _ => Expr::number(f64::NAN),
+    })
+}
+
+impl<L> Stack<'_, L> {
+    /// Takes an operator between operands, after everything that binds more tightly.
+    fn infix(&mut self, op: Binary, span: Span) -> Option<()> {
+        let arriving = precedence(op);
+        let result = self.reduce(arriving + 1);
+        if arriving == precedence(Binary::Equal)
+            && self.dialect == Dialect::Bond
+            && matches!(self.operators.last(), Some(Operator::Infix(before)) if precedence(*before) == arriving)
+        {
+            self.diagnostics.push(
+                Diagnostic::error("E0113", span, "comparisons do not chain")
+                    .help("join two comparisons with `and`"),
+            );
+            return None;
+        }
+        self.operators.push(Operator::Infix(op));
+        result
+    }
+
+    /// Applies all pending operators that bind at least as tightly as `floor`, runs of one precedence at once.
+    fn reduce(&mut self, floor: u8) -> Option<()> {
+        let mut result = Some(());
+        while let Some(top) = self.operators.last() {
+            let level = top.precedence(self.dialect);
+            if level < floor {
+                break;
+            }
+            match top {
+                Operator::Infix(..) => {
+                    let run = self
+                        .operators
+                        .iter()
+                        .rev()
+                        .take_while(
+                            |o| matches!(o, Operator::Infix(op) if precedence(*op) == level),
+                        )
+                        .count();
+                    let operators = self.operators.split_off(self.operators.len() - run);
+                    let operands =
+                        self.operands.split_off(self.operands.len().saturating_sub(run + 1));
+                    let chained = self.chain(operators, operands);
+                    self.put(chained, &mut result);
+                }
+                _ => {
+                    let operator = self.operators.pop();
+                    let operand = self.operands.pop()?;
+                    let signed = self.prefix(operator?, operand);
+                    self.put(signed, &mut result);
+                }
+            }
+        }
+        result
+    }
+
+    fn put(&mut self, part: Option<Part<L>>, result: &mut Option<()>) {
+        if part.is_none() {
+            *result = None;
+        }
+        self.operands.push(part.unwrap_or_else(|| measured(Expr::number(f64::NAN))));
+    }
+
+    fn prefix(&mut self, operator: Operator, operand: Part<L>) -> Option<Part<L>> {
+        let (unary, span) = match operator {
+            Operator::Negate(span) => (Unary::Negate, span.join(operand.expr.span)),
+            Operator::Not(span) => (Unary::Not, span.join(operand.expr.span)),
+            _ => return Some(operand),
+        };
+        if let (Unary::Negate, Some(value)) = (unary, operand.expr.as_number()) {
+            return Some(Part { expr: Expr::new(Node::Number(-value), span), depth: 1 });
+        }
+        join(Node::Unary(unary, operand.expr), operand.depth, span, self.diagnostics)
+    }
+
+    /// A run of operators of one precedence over one operand more.
+    fn chain(&mut self, operators: Vec<Operator>, operands: Vec<Part<L>>) -> Option<Part<L>> {
+        let ops: Vec<Binary> = operators
+            .iter()
+            .filter_map(|o| if let Operator::Infix(op) = o { Some(*op) } else { None })
+            .collect();
+        let power = ops.first() == Some(&Binary::Power);
+        if power && self.dialect == Dialect::Bond {
+            let mut rest = operands.into_iter().rev();
+            let last = rest.next()?;
+            return rest.try_fold(last, |right, left| self.operation(Binary::Power, left, right));
+        }
+        if ops.len() > LONG_CHAIN && matches!(precedence(ops[0]), 1 | 2 | 5 | 6) {
+            let mut operands = operands.into_iter().map(Some).collect::<Vec<_>>();
+            return self.balanced(&ops, &mut operands, false);
+        }
+        let mut rest = operands.into_iter();
+        let first = rest.next()?;
+        ops.into_iter()
+            .zip(rest)
+            .try_fold(first, |left, (op, right)| self.operation(op, left, right))
+    }
+
+    /// The same value (up to rounding) as a tree of logarithmic depth. `inverted`: a minus or a division stands
+    /// before the whole.
+    fn balanced(
+        &mut self,
+        ops: &[Binary],
+        operands: &mut [Option<Part<L>>],
+        inverted: bool,
+    ) -> Option<Part<L>> {
+        if operands.len() == 1 {
+            return operands[0].take();
+        }
+        let half = operands.len() / 2;
+        let (left, right) = operands.split_at_mut(half);
+        let inverse = |op| match op {
+            Binary::Add => Binary::Subtract,
+            Binary::Subtract => Binary::Add,
+            Binary::Multiply => Binary::Divide,
+            Binary::Divide => Binary::Multiply,
+            other => other,
+        };
+        let op = if inverted { inverse(ops[half - 1]) } else { ops[half - 1] };
+        let turned = matches!(op, Binary::Subtract | Binary::Divide);
+        let left = self.balanced(&ops[..half - 1], left, inverted)?;
+        let right = self.balanced(&ops[half..], right, inverted != turned)?;
+        self.operation(op, left, right)
+    }
+
+    fn operation(&mut self, op: Binary, left: Part<L>, right: Part<L>) -> Option<Part<L>> {
+        let span = left.expr.span.join(right.expr.span);
+        let depth = left.depth.max(right.depth);
+        let node = if op == Binary::Power && self.dialect == Dialect::Ngspice {
+            Node::Call(Function::PowerOfAbs, vec![left.expr, right.expr])
+        } else {
+            Node::Binary(op, left.expr, right.expr)
+        };
+        join(node, depth, span, self.diagnostics)
+    }
+}

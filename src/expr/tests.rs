@@ -1,0 +1,260 @@
+//! Tests of the shared grammar through two small languages, one for each dialect.
+
+use super::parse::{self, Language, MAX_DEPTH, MAX_NESTING};
+use super::{Binary, Dialect, Expr, Function, Node, roles};
+use crate::diagnostic::Diagnostic;
+use crate::source::{FileId, Span};
+use pest::Parser;
+use pest::iterators::Pair;
+
+mod bond {
+    #[derive(pest_derive::Parser)]
+    #[grammar = "grammar/expression.pest"]
+    #[grammar_inline = r#"
+        WHITESPACE    = _{ " " | "\n" }
+        whole         = { SOI ~ expression ~ EOI }
+        number        = @{ ASCII_DIGIT+ ~ ("." ~ ASCII_DIGIT*)? ~ ("e" ~ ("+" | "-")? ~ ASCII_DIGIT+)? }
+        name          = @{ !word ~ (LETTER | "_") ~ (LETTER | ASCII_DIGIT | "_")* }
+        word          = @{ ("and" | "or" | "not" | "if" | "then" | "else") ~ word_end }
+        reference     = { name }
+        special       = { !ANY ~ ANY }
+        function_name = @{ name ~ &"(" }
+        argument      = _{ named | arrow | expression }
+        named         = { name ~ "=" ~ !"=" ~ expression }
+        arrow         = { name ~ "->" ~ name }
+        op_power      = @{ "^" }
+        op_and        = @{ "and" ~ word_end }
+        op_or         = @{ "or" ~ word_end }
+        op_not        = @{ "not" ~ word_end }
+        question      = { !ANY ~ ANY }
+        colon         = { !ANY ~ ANY }
+    "#]
+    pub struct Grammar;
+}
+
+mod spice {
+    #[derive(pest_derive::Parser)]
+    #[grammar = "grammar/expression.pest"]
+    #[grammar_inline = r#"
+        WHITESPACE    = _{ " " }
+        whole         = { SOI ~ expression ~ EOI }
+        number        = @{ ASCII_DIGIT+ ~ ("." ~ ASCII_DIGIT*)? ~ ("e" ~ ("+" | "-")? ~ ASCII_DIGIT+)? }
+        name          = @{ (LETTER | "_") ~ (LETTER | ASCII_DIGIT | "_")* }
+        reference     = { name }
+        special       = { probe }
+        probe         = { ^"v" ~ "(" ~ name ~ ("," ~ name)? ~ ")" }
+        function_name = @{ name ~ &"(" }
+        argument      = _{ expression }
+        op_power      = @{ "^" | "**" }
+        op_and        = @{ "&&" }
+        op_or         = @{ "||" }
+        op_not        = @{ "!" ~ !"=" }
+        question      = { "?" }
+        colon         = { ":" }
+    "#]
+    pub struct Grammar;
+}
+
+struct Toy;
+struct ToySpice;
+
+macro_rules! toy {
+    ($toy:ident, $rule:ty, $rules:ident, $dialect:expr) => {
+        impl Language for $toy {
+            type Rule = $rule;
+            type Leaf = String;
+            const DIALECT: Dialect = $dialect;
+            roles!($rules);
+            fn span(&self, span: pest::Span<'_>) -> Span {
+                Span::new(FileId(0), span.start(), span.end())
+            }
+            fn atom(
+                &mut self,
+                pair: Pair<'_, $rule>,
+                d: &mut Vec<Diagnostic>,
+            ) -> Option<Expr<String>> {
+                let span = self.span(pair.as_span());
+                let text = pair.as_str().trim();
+                if pair.as_rule() == $rules::number {
+                    return Some(Expr::new(Node::Number(text.parse().unwrap()), span));
+                }
+                if text == "unknown" {
+                    d.push(Diagnostic::error("E0201", span, "unknown name"));
+                    return None;
+                }
+                Some(Expr::new(Node::Leaf(text.to_string()), span))
+            }
+            fn call(
+                &mut self,
+                name: &str,
+                pair: Pair<'_, $rule>,
+                d: &mut Vec<Diagnostic>,
+            ) -> Option<Expr<String>> {
+                let span = self.span(pair.as_span());
+                if name != "form" {
+                    d.push(parse::unknown_function(name, span));
+                    return None;
+                }
+                let rules = pair.into_inner().map(|p| format!("{:?}", p.as_rule()));
+                Some(Expr::leaf(rules.collect::<Vec<_>>().join(" ")))
+            }
+        }
+    };
+}
+
+use bond::Rule as BondRule;
+use spice::Rule as SpiceRule;
+toy!(Toy, bond::Rule, BondRule, Dialect::Bond);
+toy!(ToySpice, spice::Rule, SpiceRule, Dialect::Ngspice);
+
+pub(super) fn parse_bond(text: &str) -> Result<Expr<String>, Vec<Diagnostic>> {
+    if let Some(at) = parse::nesting(text, Some(b'#')) {
+        return Err(vec![parse::too_deep(Span::new(FileId(0), at, at + 1))]);
+    }
+    let mut whole = bond::Grammar::parse(bond::Rule::whole, text).expect("it parses");
+    let pair = whole.next().unwrap().into_inner().next().unwrap();
+    let mut d = vec![];
+    parse::expression(&mut Toy, pair, &mut d).ok_or(d)
+}
+
+fn parse_spice(text: &str) -> Result<Expr<String>, Vec<Diagnostic>> {
+    let mut whole = spice::Grammar::parse(spice::Rule::whole, text).expect("it parses");
+    let pair = whole.next().unwrap().into_inner().next().unwrap();
+    let mut d = vec![];
+    parse::expression(&mut ToySpice, pair, &mut d).ok_or(d)
+}
+
+fn value(text: &str) -> f64 {
+    parse_bond(text).unwrap().evaluate(&mut |_| 3.0)
+}
+
+fn spice_value(text: &str) -> f64 {
+    parse_spice(text).unwrap().evaluate(&mut |_| 3.0)
+}
+
+#[test]
+fn operators_bind_as_in_the_language() {
+    for (text, expected) in [
+        ("1 + 2*3", 7.0),
+        ("2*3 + 1", 7.0),
+        ("10 - 4 - 3", 3.0),
+        ("24/4/3", 2.0),
+        ("-2^2", -4.0),
+        ("2^3^2", 512.0),
+        ("2^-1", 0.5),
+        ("2^-1^2", 0.5),
+        ("(-2)^2", 4.0),
+        ("--3", 3.0),
+        ("2*-3*4", -24.0),
+        ("1 - -x", 4.0),
+        ("not 1 == 2", 1.0),
+        ("not 1 and 0", 0.0),
+        ("not (1 and 0)", 1.0),
+        ("1 or 0 and 0", 1.0),
+        ("1 < 2 and 2 <= 2", 1.0),
+        ("1 + 1 == 2", 1.0),
+        ("1 != 1", 0.0),
+        ("if x > 2 then 10 else 20 + 1", 10.0),
+        ("1 + if x < 2 then 10 else 20 + 1", 22.0),
+        ("if 0 then 1 else if 1 then 2 else 3", 2.0),
+        ("max(1, 5, 2)", 5.0),
+        ("clamp(x, 0, 2) * sqrt(4)", 4.0),
+        ("if_then", 3.0),
+        ("nothing+1", 4.0),
+        ("1e3 + 1e-3", 1000.001),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn netlists_have_their_own_operators() {
+    for (text, expected) in [
+        ("2**3", 8.0),
+        ("2^3^2", 64.0),
+        ("-2**2", -4.0),
+        ("(-2)**3", 8.0),
+        ("pwr(0-2, 3)", -8.0),
+        ("log(1)", 0.0),
+        ("SGN(-4)", -1.0),
+        ("1 > 2 ? 3 : 4 > 3 ? 5 : 6", 5.0),
+        ("!0 && 1 || 0", 1.0),
+        ("!x+1", 1.0),
+        ("u(-1) + u(0) + u(2)", 1.5),
+        ("uramp(-1) + uramp(x)", 3.0),
+        ("v(a, b) * V(c)", 9.0),
+        ("(v(a) > 2) ? (1) : (2)", 1.0),
+        ("ceil(1.2)", 2.0),
+    ] {
+        assert_eq!(spice_value(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn spans_cover_what_they_mean() {
+    let expr = parse_bond("1 + ab*(cd - 2)").unwrap();
+    let Node::Binary(Binary::Add, _, product) = &*expr.node else { panic!() };
+    let Node::Binary(Binary::Multiply, left, right) = &*product.node else { panic!() };
+    assert_eq!((left.span.start, left.span.end), (4, 6));
+    assert_eq!((right.span.start, right.span.end), (8, 14));
+}
+
+#[test]
+fn errors_are_collected() {
+    let codes = |text| parse_bond(text).unwrap_err().iter().map(|d| d.code).collect::<Vec<_>>();
+    assert_eq!(codes("unknown + sqrt(1, 2) * sqr(4)"), ["E0201", "E0112", "E0210"]);
+    assert_eq!(codes("1 < x < 2"), ["E0113"]);
+    assert_eq!(codes("max(1; 2)"), ["E0111"]);
+    assert_eq!(codes("if unknown then unknown else 1"), ["E0201", "E0201"]);
+    let help = parse_bond("sqr(4)").unwrap_err()[0].help.clone();
+    assert_eq!(help.as_deref(), Some("did you mean `sqrt`?"));
+}
+
+#[test]
+fn other_calls_go_to_the_language_as_they_are() {
+    let Node::Leaf(rules) = *parse_bond("form(x, Kp = 2; a -> b)").unwrap().node else { panic!() };
+    assert_eq!(rules, "function_name expression named row_break arrow");
+}
+
+#[test]
+fn long_chains_are_balanced() {
+    let n = 200_000;
+    let sum = parse_bond(&vec!["1"; n].join("+")).unwrap();
+    assert!(sum.depth() < 30);
+    assert_eq!(sum.constant(), Some(n as f64));
+    // Signs survive balancing.
+    let mixed: String =
+        (1..1000).map(|k| format!("{} {k}", if k % 3 == 0 { "+" } else { "-" })).collect();
+    let expected: f64 =
+        (1..1000).map(|k| if k % 3 == 0 { f64::from(k) } else { -f64::from(k) }).sum();
+    assert_eq!(value(&mixed), expected);
+    let product: String = (0..100).map(|k| if k % 3 == 0 { "*2" } else { "/2" }).collect();
+    assert_eq!(value(&format!("1{product}")), 2f64.powi(34 - 66));
+}
+
+#[test]
+fn what_is_too_deep_is_refused() {
+    let code = |text: &str| parse_bond(text).unwrap_err()[0].code;
+    let nested = |n: usize| format!("{}1{}", "(".repeat(n), ")".repeat(n));
+    assert_eq!(value(&nested(MAX_NESTING)), 1.0);
+    assert_eq!(code(&nested(MAX_NESTING + 1)), "E0110");
+    assert_eq!(code(&nested(10_000)), "E0110");
+    assert_eq!(code(&"if 1 then 1 else ".repeat(10_000)), "E0110");
+    assert_eq!(code(&format!("{}x", "-".repeat(100_000))), "E0110");
+    assert_eq!(code(&format!("x{}", "^x".repeat(MAX_DEPTH + 1))), "E0110");
+    // Nested long chains add up.
+    let deep = (0..MAX_NESTING).fold("x".to_string(), |s, _| format!("({s}+1{})", "+1".repeat(20)));
+    assert_eq!(code(&deep), "E0110");
+    assert_eq!(parse::nesting("# ((((\n(1)", Some(b'#')), None);
+}
+
+#[test]
+fn functions_have_names_in_both() {
+    for row in super::FUNCTIONS {
+        assert!(super::functions::find(Dialect::Bond, row.name).is_some());
+    }
+    assert!(matches!(
+        super::functions::find(Dialect::Ngspice, "PWR"),
+        Some(super::functions::Meaning::Function(Function::SignedPower))
+    ));
+}
