@@ -2,8 +2,10 @@
 //!
 //! Signs (as SPICE): a branch current runs from the first node through the device to the second.
 
-pub mod stamps;
 pub mod waveform;
+pub mod devices;
+pub mod stamper;
+pub mod stamps;
 
 use crate::expr;
 use crate::source::Span;
@@ -179,4 +181,22 @@ pub struct Circuit {
     pub options: Vec<(String, String)>,
     /// Output grid (interval), where the header or the command line asks for one.
     pub grid: Option<f64>,
+}
+
+impl Circuit {
+    /// The devices with their indices.
+    pub fn ids(&self) -> impl Iterator<Item = (DeviceId, &Device)> {
+        self.devices.iter().enumerate().map(|(k, device)| (DeviceId(k as u32), device))
+    }
+}
+
+impl Device {
+    /// The name of its current as ngspice writes it: `i(l1)`, within instances `i(l.x1.l1)`.
+    pub fn current_name(&self) -> String {
+        let name = self.name.to_lowercase();
+        match name.rsplit_once('.').and_then(|(_, own)| own.chars().next()) {
+            Some(letter) => format!("i({letter}.{name})"),
+            None => format!("i({name})"),
+        }
+    }
 }

@@ -11,9 +11,24 @@
 //! (unknowns x and w = dQ/dt) gives consistent values at the start, after every corner and at output rows. m are
 //! modes: values that change only at events.
 
-use super::{DeviceId, Waveform};
+use super::devices;
+use super::stamper::Stamper;
+use super::{Circuit, DeviceId, Waveform};
+use crate::diagnostic::Diagnostic;
 use crate::expr;
 use crate::source::Span;
+
+/// The stamps of a circuit, by the rows of [`devices::DEVICES`]. `None` when a device makes no sense; the reasons are
+/// in `diagnostics`.
+pub fn stamp(circuit: &Circuit, diagnostics: &mut Vec<Diagnostic>) -> Option<Stamps> {
+    let before = diagnostics.len();
+    let mut stamper = Stamper::new(circuit, diagnostics);
+    for (id, device) in circuit.ids() {
+        (devices::row(&device.kind).stamp)(&mut stamper, id);
+    }
+    let stamps = stamper.finish();
+    (!crate::diagnostic::has_errors(&diagnostics[before..])).then_some(stamps)
+}
 
 /// Index of an unknown and of its equation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -141,6 +156,8 @@ pub struct Stamps {
     pub sources: Vec<SourceStamp>,
     /// Modes.
     pub modes: Vec<Mode>,
+    /// `.ic` values of nodes, which hold them during an operating point; under `uic` they have become charges.
+    pub initial: Vec<(UnknownId, f64)>,
     /// Output columns: name and value.
     pub outputs: Vec<(String, Law)>,
     /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`), or held while

@@ -1,0 +1,319 @@
+//! Junction diode, level 1 of SPICE3, at 27 °C, without a gmin of its own.
+//!
+//! ```text
+//! Vt = k·T/q, T = 300.15 K                                   (i, q scale with the area, Rs by its reciprocal)
+//! v ≥ −3·N·Vt        i = Is·(e^(v/(N·Vt)) − 1)
+//! −BV ≤ v < −3·N·Vt  i = −Is·(1 + (3·N·Vt/(e·v))³)
+//! v < −BV'           i = −Is·e^(−(BV' + v)/(N·Vt))           BV' such that i(−BV) = −IBV
+//! v < FC·Vj          q = TT·i + Cjo·Vj/(1 − M)·(1 − (1 − v/Vj)^(1 − M))
+//! v ≥ FC·Vj          q = TT·i + Cjo·(F1 + (F3·(v − FC·Vj) + M/(2·Vj)·(v² − (FC·Vj)²))/F2)
+//! F1 = Vj/(1 − M)·(1 − (1 − FC)^(1 − M)), F2 = (1 − FC)^(1 + M), F3 = 1 − FC·(1 + M)
+//! ```
+//!
+//! v is across the junction; a series resistance Rs stands between the anode and an internal node. The middle region
+//! is what SPICE3 has instead of the exponential far below zero; it joins with equal slope.
+//!
+//! Source: T. Quarles, The SPICE3 implementation guide, UCB/ERL M89/44, 1989; P. Antognetti, G. Massobrio,
+//! Semiconductor Device Modeling with SPICE, 1988, chapter 1.
+
+use super::{Needs, Row};
+use crate::circuit::stamper::{Current, Stamper, voltage};
+use crate::circuit::stamps::{Junction, Law, LawStamp, Leaf, UnknownId};
+use crate::circuit::{DeviceId, DeviceKind, DiodeModel};
+use crate::expr::{Binary, Function, Node};
+use crate::source::Span;
+
+/// Boltzmann's constant times 300.15 K over the elementary charge (both exact in the SI of 2019), in V.
+pub const THERMAL_VOLTAGE: f64 = 1.380649e-23 / 1.602176634e-19 * 300.15;
+
+/// The row of the table.
+pub const ROW: Row = Row {
+    name: "diode",
+    letters: "D",
+    equation: "i = Is (exp(v/(N Vt)) - 1) + dq/dt",
+    needs: |kind| match kind {
+        DeviceKind::Diode { model, .. } => Needs {
+            internal: model.series_resistance != 0.0,
+            charge: model.junction_capacitance != 0.0 || model.transit_time != 0.0,
+            ..Needs::NOTHING
+        },
+        _ => Needs::NOTHING,
+    },
+    stamp,
+    current,
+};
+
+fn stamp(stamper: &mut Stamper, id: DeviceId) {
+    let DeviceKind::Diode { model, area } = stamper.device(id).kind else { return };
+    if !plausible(stamper, id, &model, area) {
+        return;
+    }
+    let [anode, cathode] = stamper.ends(id);
+    let across = junction(stamper, id);
+    if let Some(internal) = stamper.internal(id) {
+        let conductance = area / model.series_resistance;
+        stamper.difference(anode, [anode, Some(internal)], conductance);
+        stamper.difference(Some(internal), [Some(internal), anode], conductance);
+    }
+    let into = stamper.leaving([across[0], cathode]);
+    let thermal = model.emission * THERMAL_VOLTAGE;
+    let critical =
+        thermal * (thermal / (std::f64::consts::SQRT_2 * model.saturation_current * area)).ln();
+    let law = conduction(&model, area, across);
+    if !into.is_empty() {
+        let junction = Some(Junction { across, thermal, critical });
+        stamper.stamps.laws.push(LawStamp { device: id, law, into: into.clone(), junction });
+    }
+    let stored = storage(&model, area, across);
+    if let Some(charge) = stamper.charge_mut(id) {
+        charge.law = Some(stored);
+        charge.into = into;
+    }
+}
+
+fn current(stamper: &Stamper, id: DeviceId) -> Current {
+    let DeviceKind::Diode { model, area } = stamper.device(id).kind else {
+        return Current::Linear(vec![]);
+    };
+    let conducted = conduction(&model, area, junction(stamper, id));
+    Current::Law(match stamper.charge(id) {
+        Some(charge) => conducted.binary(Binary::Add, Law::leaf(Leaf::Rate(charge))),
+        None => conducted,
+    })
+}
+
+/// What the junction is across: the internal node instead of the anode where there is one.
+fn junction(stamper: &Stamper, id: DeviceId) -> [Option<UnknownId>; 2] {
+    let [anode, cathode] = stamper.ends(id);
+    [stamper.internal(id).or(anode), cathode]
+}
+
+fn plausible(stamper: &mut Stamper, id: DeviceId, model: &DiodeModel, area: f64) -> bool {
+    let positive = [
+        ("Is", model.saturation_current),
+        ("N", model.emission),
+        ("Vj", model.junction_potential),
+        ("area", area),
+        ("IBV", model.breakdown_current),
+        ("BV", model.breakdown_voltage.unwrap_or(1.0)),
+    ];
+    let others = [
+        ("Rs", model.series_resistance),
+        ("Cjo", model.junction_capacitance),
+        ("TT", model.transit_time),
+        ("M", model.grading),
+        ("FC", model.forward_bias_depletion),
+    ];
+    if !stamper.finite(id, &positive) || !stamper.finite(id, &others) {
+        return false;
+    }
+    let name = &stamper.device(id).name;
+    if let Some((what, value)) = positive.iter().find(|(_, value)| *value <= 0.0) {
+        stamper.error(
+            "E0753",
+            id,
+            format!("{what} of the diode `{name}` is {value}, but must be above 0"),
+        );
+        return false;
+    }
+    for (what, value) in &others[3..] {
+        if !(0.0..1.0).contains(value) {
+            stamper.error(
+                "E0753",
+                id,
+                format!("{what} of the diode `{name}` is {value}, outside 0 to 1"),
+            );
+            return false;
+        }
+    }
+    true
+}
+
+fn number(value: f64) -> Law {
+    Law::number(value)
+}
+
+fn add(a: Law, b: Law) -> Law {
+    a.binary(Binary::Add, b)
+}
+
+fn times(a: Law, b: Law) -> Law {
+    a.binary(Binary::Multiply, b)
+}
+
+/// a where v < limit, else b.
+fn below(v: Law, limit: f64, a: Law, b: Law) -> Law {
+    Law::new(Node::If(v.binary(Binary::Less, number(limit)), a, b), Span::NONE)
+}
+
+/// The current through the junction.
+fn conduction(model: &DiodeModel, area: f64, across: [Option<UnknownId>; 2]) -> Law {
+    let v = || voltage(across);
+    let saturation = model.saturation_current * area;
+    let thermal = model.emission * THERMAL_VOLTAGE;
+    let exp = |argument| Law::call(Function::Exp, vec![argument]);
+    let forward =
+        times(number(saturation), add(exp(times(v(), number(1.0 / thermal))), number(-1.0)));
+    let ratio = || number(3.0 * thermal / std::f64::consts::E).binary(Binary::Divide, v());
+    let cube = times(times(ratio(), ratio()), ratio());
+    let mut reverse = times(number(-saturation), add(number(1.0), cube));
+    if let Some(breakdown) = model.breakdown_voltage {
+        let breakdown = matched_breakdown(
+            breakdown,
+            model.breakdown_current / model.saturation_current,
+            thermal,
+        );
+        let argument = times(add(v(), number(breakdown)), number(-1.0 / thermal));
+        reverse = below(v(), -breakdown, times(number(-saturation), exp(argument)), reverse);
+    }
+    below(v(), -3.0 * thermal, reverse, forward)
+}
+
+/// BV' of the header: the voltage whose exponential gives IBV at −BV, by the fixed point of SPICE3.
+fn matched_breakdown(breakdown: f64, current: f64, thermal: f64) -> f64 {
+    if current < breakdown / thermal {
+        // The leakage alone is more than IBV there: SPICE3 then takes BV as it stands.
+        return breakdown;
+    }
+    let mut matched = breakdown - thermal * (1.0 + current).ln();
+    for _ in 0..25 {
+        matched = breakdown - thermal * (current + 1.0 - matched / thermal).ln();
+    }
+    if matched.is_finite() { matched } else { breakdown }
+}
+
+/// The charge of the junction.
+fn storage(model: &DiodeModel, area: f64, across: [Option<UnknownId>; 2]) -> Law {
+    let v = || voltage(across);
+    let (vj, m, fc) = (model.junction_potential, model.grading, model.forward_bias_depletion);
+    let cj = model.junction_capacitance * area;
+    let mut terms = vec![];
+    if cj != 0.0 {
+        let base = add(number(1.0), times(v(), number(-1.0 / vj)));
+        // The base is positive where this branch counts; elsewhere |base| keeps it a number.
+        let power = Law::call(Function::PowerOfAbs, vec![base, number(1.0 - m)]);
+        let depleted = times(number(cj * vj / (1.0 - m)), add(number(1.0), power.negate()));
+        let (limit, f2, f3) = (fc * vj, (1.0 - fc).powf(1.0 + m), 1.0 - fc * (1.0 + m));
+        let f1 = vj / (1.0 - m) * (1.0 - (1.0 - fc).powf(1.0 - m));
+        let constant = cj * (f1 - (f3 * limit + m / (2.0 * vj) * limit * limit) / f2);
+        let forward = add(
+            number(constant),
+            add(
+                times(number(cj * f3 / f2), v()),
+                times(number(cj * m / (2.0 * vj * f2)), times(v(), v())),
+            ),
+        );
+        terms.push(below(v(), limit, depleted, forward));
+    }
+    if model.transit_time != 0.0 {
+        terms.push(times(number(model.transit_time), conduction(model, area, across)));
+    }
+    terms.into_iter().reduce(add).unwrap_or(number(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circuit::devices::testing::*;
+
+    const MODEL: DiodeModel = DiodeModel {
+        saturation_current: 1e-14,
+        emission: 1.0,
+        series_resistance: 0.0,
+        junction_capacitance: 0.0,
+        junction_potential: 1.0,
+        grading: 0.5,
+        transit_time: 0.0,
+        forward_bias_depletion: 0.5,
+        breakdown_voltage: None,
+        breakdown_current: 1e-3,
+    };
+
+    fn diode(model: DiodeModel, area: f64) -> crate::circuit::stamps::Stamps {
+        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model, area })])
+    }
+
+    fn at(law: &Law, v: f64) -> f64 {
+        value(law, &[v], &[], &[], 0.0)
+    }
+
+    /// The slope on one side, by differences.
+    fn slope(law: &Law, v: f64, h: f64) -> f64 {
+        (at(law, v + h) - at(law, v)) / h
+    }
+
+    #[test]
+    fn conducts_as_the_equation_says() {
+        let stamps = diode(MODEL, 2.0);
+        let law = &stamps.laws[0].law;
+        let vt = 1.380649e-23 * 300.15 / 1.602176634e-19;
+        let expected = 2e-14 * ((0.6f64 / vt).exp() - 1.0);
+        assert!((at(law, 0.6) / expected - 1.0).abs() < 1e-12);
+        assert_eq!(at(law, 0.0), 0.0);
+        assert!((at(law, -5.0) / -2e-14 - 1.0).abs() < 1e-6);
+        let junction = stamps.laws[0].junction.unwrap();
+        assert_eq!(junction.across, [Some(UnknownId(0)), None]);
+        assert!((junction.critical - vt * (vt / (2f64.sqrt() * 2e-14)).ln()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn regions_join_smoothly() {
+        let model = DiodeModel { junction_capacitance: 1e-12, transit_time: 0.0, ..MODEL };
+        let stamps = diode(model, 1.0);
+        let edge = -3.0 * THERMAL_VOLTAGE;
+        for (law, v, h) in [
+            (&stamps.laws[0].law, edge, 1e-7),
+            (stamps.charges[0].law.as_ref().unwrap(), 0.5, 1e-6),
+        ] {
+            let (before, after) = (slope(law, v, -h), slope(law, v, h));
+            assert!((before / after - 1.0).abs() < 1e-3, "{before} {after} at {v}");
+            assert!((at(law, v - 1e-12) / at(law, v) - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn breaks_down_at_its_voltage_with_its_current() {
+        let model = DiodeModel { breakdown_voltage: Some(5.0), breakdown_current: 1e-3, ..MODEL };
+        let stamps = diode(model, 1.0);
+        let law = &stamps.laws[0].law;
+        assert!((at(law, -5.0) / -1e-3 - 1.0).abs() < 1e-3, "{}", at(law, -5.0));
+        assert!(at(law, -4.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn stores_depletion_and_transit_charge() {
+        let model = DiodeModel { junction_capacitance: 4e-12, transit_time: 1e-9, ..MODEL };
+        let stamps = diode(model, 1.0);
+        let charge = stamps.charges[0].law.as_ref().unwrap();
+        // C(v) = Cjo/√(1 − v/Vj) at v = −3 is Cjo/2; the conduction there has no slope.
+        assert!((slope(charge, -3.0, 1e-4) / 2e-12 - 1.0).abs() < 1e-3);
+        let i = at(&stamps.laws[0].law, 0.65);
+        let depletion = diode(DiodeModel { transit_time: 0.0, ..model }, 1.0);
+        let depletion = at(depletion.charges[0].law.as_ref().unwrap(), 0.65);
+        assert!((at(charge, 0.65) - depletion - 1e-9 * i).abs() < 1e-24);
+    }
+
+    #[test]
+    fn a_series_resistance_adds_a_node() {
+        let stamps = diode(DiodeModel { series_resistance: 4.0, ..MODEL }, 2.0);
+        assert_eq!(stamps.unknowns[1].name, "v(d1#internal)");
+        assert_eq!(stamps.nodes, 2);
+        assert_eq!(conductances(&stamps), [[0.5, -0.5], [-0.5, 0.5]]);
+        assert_eq!(stamps.laws[0].into, [(UnknownId(1), 1.0)]);
+        assert_eq!(stamps.outputs.len(), 1);
+    }
+
+    #[test]
+    fn senseless_parameters_are_errors() {
+        for model in [
+            DiodeModel { saturation_current: 0.0, ..MODEL },
+            DiodeModel { emission: -1.0, ..MODEL },
+            DiodeModel { grading: 1.0, ..MODEL },
+        ] {
+            let circuit = circuit(vec![("d1", vec![1, 0], DeviceKind::Diode { model, area: 1.0 })]);
+            let mut diagnostics = vec![];
+            assert!(crate::circuit::stamps::stamp(&circuit, &mut diagnostics).is_none());
+            assert_eq!(diagnostics[0].code, "E0753");
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! Gives every node and branch its unknown, and lets devices write their terms in terms of nodes and devices.
+
+use super::devices::{self, Branch};
+use super::stamps::{Charge, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId};
+use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Waveform};
+use crate::diagnostic::Diagnostic;
+use crate::expr::{self, Binary};
+
+/// A circuit on its way to its stamps.
+pub struct Stamper<'a> {
+    /// The circuit.
+    pub circuit: &'a Circuit,
+    /// What there is so far.
+    pub stamps: Stamps,
+    diagnostics: &'a mut Vec<Diagnostic>,
+    slots: Vec<Slots>,
+}
+
+/// What belongs to one device alone.
+#[derive(Clone, Copy, Default)]
+struct Slots {
+    branch: Option<UnknownId>,
+    internal: Option<UnknownId>,
+    charge: Option<u32>,
+    mode: Option<u32>,
+}
+
+/// The current of a device in terms of the unknowns.
+#[derive(Clone, Debug)]
+pub enum Current {
+    /// A sum of unknowns with factors.
+    Linear(Vec<(UnknownId, f64)>),
+    /// Anything else.
+    Law(Law),
+}
+
+impl Current {
+    /// As a law.
+    pub fn law(&self) -> Law {
+        match self {
+            Current::Law(law) => law.clone(),
+            Current::Linear(terms) => terms
+                .iter()
+                .map(|(unknown, factor)| {
+                    let unknown = Law::leaf(Leaf::Unknown(*unknown));
+                    if *factor == 1.0 {
+                        unknown
+                    } else {
+                        Law::number(*factor).binary(Binary::Multiply, unknown)
+                    }
+                })
+                .reduce(|sum, term| sum.binary(Binary::Add, term))
+                .unwrap_or(Law::number(0.0)),
+        }
+    }
+
+    /// gain times it.
+    pub fn scaled(&self, gain: f64) -> Current {
+        match self {
+            Current::Linear(terms) => Current::Linear(
+                terms.iter().map(|(unknown, factor)| (*unknown, gain * factor)).collect(),
+            ),
+            Current::Law(law) => {
+                Current::Law(Law::number(gain).binary(Binary::Multiply, law.clone()))
+            }
+        }
+    }
+}
+
+impl<'a> Stamper<'a> {
+    /// Numbers the unknowns: nodes, internal nodes, then branches in device order; and charges and modes.
+    pub fn new(circuit: &'a Circuit, diagnostics: &'a mut Vec<Diagnostic>) -> Stamper<'a> {
+        let mut stamps = Stamps::default();
+        for node in circuit.nodes.iter().skip(1) {
+            let name = format!("v({})", node.name.to_lowercase());
+            stamps.unknowns.push(Unknown {
+                name,
+                voltage: true,
+                nominal: node.nominal,
+                device: None,
+            });
+        }
+        let (read, observed) = readings(circuit);
+        let mut slots = vec![Slots::default(); circuit.devices.len()];
+        for (id, device) in circuit.ids() {
+            let needs = (devices::row(&device.kind).needs)(&device.kind);
+            let slot = &mut slots[id.0 as usize];
+            if needs.internal {
+                let at = device.nodes.first().and_then(|n| circuit.nodes.get(n.0 as usize));
+                slot.internal = Some(UnknownId(stamps.unknowns.len() as u32));
+                stamps.unknowns.push(Unknown {
+                    name: format!("v({}#internal)", device.name.to_lowercase()),
+                    voltage: true,
+                    nominal: at.and_then(|node| node.nominal),
+                    device: Some(id),
+                });
+            }
+            if needs.charge {
+                slot.charge = Some(stamps.charges.len() as u32);
+                let (linear, into) = (vec![], vec![]);
+                stamps.charges.push(Charge { device: id, linear, law: None, into, initial: None });
+            }
+            if needs.mode {
+                slot.mode = Some(stamps.modes.len() as u32);
+                let control = Law::number(0.0);
+                stamps.modes.push(Mode { device: id, control, on: 0.0, off: 0.0, initial: None });
+            }
+        }
+        stamps.nodes = stamps.unknowns.len();
+        for (id, device) in circuit.ids() {
+            let k = id.0 as usize;
+            let branch = match (devices::row(&device.kind).needs)(&device.kind).branch {
+                Branch::Always => true,
+                Branch::Never => false,
+                Branch::WhenRead => read[k],
+                Branch::WhenObserved => read[k] || observed[k],
+            };
+            if branch {
+                slots[k].branch = Some(UnknownId(stamps.unknowns.len() as u32));
+                let (name, nominal) = (device.current_name(), device.nominal);
+                stamps.unknowns.push(Unknown { name, voltage: false, nominal, device: Some(id) });
+            }
+        }
+        Stamper { circuit, stamps, diagnostics, slots }
+    }
+
+    /// Adds outputs and initial values, and hands over.
+    pub fn finish(mut self) -> Stamps {
+        self.stamps.outputs = if self.circuit.outputs.is_empty() {
+            let own =
+                |unknown: &&(usize, &Unknown)| !(unknown.1.voltage && unknown.1.device.is_some());
+            let unknowns = self.stamps.unknowns.iter().enumerate().collect::<Vec<_>>();
+            unknowns
+                .iter()
+                .filter(own)
+                .map(|(k, unknown)| {
+                    (unknown.name.clone(), Law::leaf(Leaf::Unknown(UnknownId(*k as u32))))
+                })
+                .collect()
+        } else {
+            self.circuit
+                .outputs
+                .iter()
+                .map(|output| (output.name.clone(), self.law(&output.expr)))
+                .collect()
+        };
+        self.stamps.initial = self
+            .circuit
+            .initial
+            .iter()
+            .filter_map(|(node, value)| self.node(*node).map(|unknown| (unknown, *value)))
+            .collect();
+        self.stamps
+    }
+
+    /// Reports what is wrong with a device.
+    pub fn error(&mut self, code: &'static str, id: DeviceId, message: impl Into<String>) {
+        let span = self.device(id).span;
+        self.diagnostics.push(Diagnostic::error(code, span, message));
+    }
+
+    /// Reports a value that is not finite; says whether all are.
+    pub fn finite(&mut self, id: DeviceId, values: &[(&str, f64)]) -> bool {
+        let bad = values.iter().find(|(_, value)| !value.is_finite());
+        if let Some((what, value)) = bad {
+            let message = format!("the {what} of `{}` is {value}", self.device(id).name);
+            self.error("E0750", id, message);
+        }
+        bad.is_none()
+    }
+
+    /// The device of an index.
+    pub fn device(&self, id: DeviceId) -> &'a Device {
+        &self.circuit.devices[id.0 as usize]
+    }
+
+    /// The unknown of a node; `None` for ground.
+    pub fn node(&self, node: NodeId) -> Option<UnknownId> {
+        node.0.checked_sub(1).map(UnknownId)
+    }
+
+    /// The unknowns of a device's first two nodes.
+    pub fn ends(&self, id: DeviceId) -> [Option<UnknownId>; 2] {
+        let nodes = &self.device(id).nodes;
+        [0, 1].map(|k| nodes.get(k).and_then(|node| self.node(*node)))
+    }
+
+    /// The branch current of a device that has one.
+    pub fn branch(&self, id: DeviceId) -> Option<UnknownId> {
+        self.slots[id.0 as usize].branch
+    }
+
+    /// The internal node of a device that has one.
+    pub fn internal(&self, id: DeviceId) -> Option<UnknownId> {
+        self.slots[id.0 as usize].internal
+    }
+
+    /// The charge or flux of a device that has one.
+    pub fn charge(&self, id: DeviceId) -> Option<u32> {
+        self.slots[id.0 as usize].charge
+    }
+
+    /// The mode of a device that has one.
+    pub fn mode(&self, id: DeviceId) -> Option<u32> {
+        self.slots[id.0 as usize].mode
+    }
+
+    /// The charge or flux of a device, to write to.
+    pub fn charge_mut(&mut self, id: DeviceId) -> Option<&mut Charge> {
+        let index = self.charge(id)?;
+        self.stamps.charges.get_mut(index as usize)
+    }
+
+    /// Adds to G at (row, column); ground has neither.
+    pub fn conductance(&mut self, row: Option<UnknownId>, column: Option<UnknownId>, value: f64) {
+        if let (Some(row), Some(column)) = (row, column) {
+            self.stamps.conductances.push((row, column, value));
+        }
+    }
+
+    /// Adds factor·(v(a) − v(b)) to an equation.
+    pub fn difference(
+        &mut self,
+        row: Option<UnknownId>,
+        across: [Option<UnknownId>; 2],
+        factor: f64,
+    ) {
+        self.conductance(row, across[0], factor);
+        self.conductance(row, across[1], -factor);
+    }
+
+    /// Lets a branch current run through its device: it leaves the first node and enters the second.
+    pub fn through(&mut self, id: DeviceId, branch: UnknownId) {
+        let [a, b] = self.ends(id);
+        self.conductance(a, Some(branch), 1.0);
+        self.conductance(b, Some(branch), -1.0);
+    }
+
+    /// Subtracts a current from the equation of a branch: the branch's own law, moved to the left side.
+    pub fn oppose(&mut self, id: DeviceId, row: UnknownId, current: Current) {
+        self.add(id, current.scaled(-1.0), vec![(row, 1.0)]);
+    }
+
+    /// Adds a current with factors to equations.
+    pub fn add(&mut self, id: DeviceId, current: Current, into: Vec<(UnknownId, f64)>) {
+        match current {
+            Current::Linear(terms) => {
+                for (row, factor) in into {
+                    for (column, value) in &terms {
+                        self.conductance(Some(row), Some(*column), factor * value);
+                    }
+                }
+            }
+            Current::Law(law) => self.add_law(id, law, into),
+        }
+    }
+
+    /// Adds a law with factors to equations.
+    pub fn add_law(&mut self, device: DeviceId, law: Law, into: Vec<(UnknownId, f64)>) {
+        if !into.is_empty() {
+            self.stamps.laws.push(LawStamp { device, law, into, junction: None });
+        }
+    }
+
+    /// Adds an independent source to right-hand sides.
+    pub fn add_source(
+        &mut self,
+        device: DeviceId,
+        waveform: &Waveform,
+        into: Vec<(UnknownId, f64)>,
+    ) {
+        if !into.is_empty() {
+            self.stamps.sources.push(SourceStamp { device, waveform: waveform.clone(), into });
+        }
+    }
+
+    /// The equations of two nodes with the factors +1 and −1: what a current from the first to the second enters.
+    pub fn leaving(&self, ends: [Option<UnknownId>; 2]) -> Vec<(UnknownId, f64)> {
+        match ends {
+            [Some(a), Some(b)] if a == b => vec![],
+            [a, b] => a.map(|a| (a, 1.0)).into_iter().chain(b.map(|b| (b, -1.0))).collect(),
+        }
+    }
+
+    /// The current of a device from its first node to its second: its branch, or what its row says.
+    pub fn current(&self, id: DeviceId) -> Current {
+        match self.branch(id) {
+            Some(branch) => Current::Linear(vec![(branch, 1.0)]),
+            None => (devices::row(&self.device(id).kind).current)(self, id),
+        }
+    }
+
+    /// An expression over nodes and devices as a law over unknowns.
+    pub fn law(&self, expr: &Expr) -> Law {
+        expr.map(&mut |leaf, span| {
+            let law = match leaf {
+                super::Leaf::Voltage(a, b) => voltage([self.node(*a), self.node(*b)]),
+                super::Leaf::Current(id) => self.current(*id).law(),
+                super::Leaf::Time => Law::leaf(Leaf::Time),
+            };
+            Law { span, ..law }
+        })
+    }
+
+    /// The value that `.ic` gives the voltage across two nodes, when it speaks of either.
+    pub fn initial_voltage(&self, nodes: &[NodeId]) -> Option<f64> {
+        // The last card wins.
+        let value = |k: usize| {
+            let node = nodes.get(k)?;
+            self.circuit
+                .initial
+                .iter()
+                .rev()
+                .find(|(named, _)| named == node)
+                .map(|(_, value)| *value)
+        };
+        match (value(0), value(1)) {
+            (None, None) => None,
+            (a, b) => Some(a.unwrap_or(0.0) - b.unwrap_or(0.0)),
+        }
+    }
+}
+
+/// v(a) − v(b) as a law.
+pub fn voltage(across: [Option<UnknownId>; 2]) -> Law {
+    let unknown = |id| Law::leaf(Leaf::Unknown(id));
+    match across {
+        [a, b] if a == b => Law::number(0.0),
+        [Some(a), None] => unknown(a),
+        [None, Some(b)] => unknown(b).negate(),
+        [Some(a), Some(b)] => unknown(a).binary(Binary::Subtract, unknown(b)),
+        [None, None] => Law::number(0.0),
+    }
+}
+
+/// Which devices' currents are read by other devices, and which by outputs.
+fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
+    fn mark(expr: &expr::Expr<super::Leaf>, marks: &mut [bool]) {
+        expr.leaves(&mut |leaf, _| {
+            if let super::Leaf::Current(id) = leaf {
+                marks[id.0 as usize] = true;
+            }
+        });
+    }
+    let mut read = vec![false; circuit.devices.len()];
+    let mut observed = read.clone();
+    for device in &circuit.devices {
+        match &device.kind {
+            DeviceKind::Cccs { control, .. } | DeviceKind::Ccvs { control, .. } => {
+                read[control.0 as usize] = true
+            }
+            DeviceKind::BehaviouralVoltage { law } | DeviceKind::BehaviouralCurrent { law } => {
+                mark(law, &mut read)
+            }
+            DeviceKind::Switch { control, .. } => mark(control, &mut read),
+            _ => {}
+        }
+    }
+    circuit.outputs.iter().for_each(|output| mark(&output.expr, &mut observed));
+    (read, observed)
+}
