@@ -1,7 +1,9 @@
 //! Gives every node and branch its unknown, and lets devices write their terms in terms of nodes and devices.
 
 use super::devices::{self, Branch};
-use super::stamps::{Charge, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId};
+use super::stamps::{
+    Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
+};
 use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary};
@@ -80,6 +82,8 @@ impl<'a> Stamper<'a> {
                 device: None,
             });
         }
+        let label = |device: &Device| DeviceLabel { name: device.name.clone(), span: device.span };
+        stamps.devices = circuit.devices.iter().map(label).collect();
         let (read, observed) = readings(circuit);
         let mut slots = vec![Slots::default(); circuit.devices.len()];
         for (id, device) in circuit.ids() {
@@ -93,6 +97,7 @@ impl<'a> Stamper<'a> {
                     voltage: true,
                     nominal: at.and_then(|node| node.nominal),
                     device: Some(id),
+                    span: device.span,
                 });
             }
             if needs.charge {
@@ -117,8 +122,14 @@ impl<'a> Stamper<'a> {
             };
             if branch {
                 slots[k].branch = Some(UnknownId(stamps.unknowns.len() as u32));
-                let (name, nominal) = (device.current_name(), device.nominal);
-                stamps.unknowns.push(Unknown { name, voltage: false, nominal, device: Some(id) });
+                let (name, nominal, span) = (device.current_name(), device.nominal, device.span);
+                stamps.unknowns.push(Unknown {
+                    name,
+                    voltage: false,
+                    nominal,
+                    device: Some(id),
+                    span,
+                });
             }
         }
         Stamper { circuit, stamps, diagnostics, slots }

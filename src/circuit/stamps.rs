@@ -59,7 +59,7 @@ pub struct Unknown {
     pub voltage: bool,
     /// A typical magnitude, where one is known.
     pub nominal: Option<f64>,
-    /// The device whose branch it is, `None` for a node.
+    /// The device whose branch or internal node it is, `None` for a node of the netlist.
     pub device: Option<DeviceId>,
     /// Where the node is first used, or the device's card.
     pub span: Span,
@@ -156,12 +156,10 @@ pub struct Stamps {
     pub sources: Vec<SourceStamp>,
     /// Modes.
     pub modes: Vec<Mode>,
-    /// `.ic` values of nodes, which hold them during an operating point; under `uic` they have become charges.
-    pub initial: Vec<(UnknownId, f64)>,
     /// Output columns: name and value.
     pub outputs: Vec<(String, Law)>,
-    /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`), or held while
-    /// the operating point is sought.
+    /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`; capacitors have
+    /// taken theirs already), or held while the operating point is sought. The last of several wins.
     pub initial: Vec<(UnknownId, f64)>,
     /// Names and places, indexed by [`DeviceId`].
     pub devices: Vec<DeviceLabel>,

@@ -49,6 +49,10 @@ pub const CODES: &[Code] = &[
     // -- 05: initial values, the graph's equations
     // -- 06: translation
     // -- 07: netlists and circuits
+    row("E0750", "value is not finite", "A device's value came out infinite or as no number, mostly from a division by 0 in a parameter. The message names the device and the value."),
+    row("E0751", "coupling makes no sense", "K couples two different inductors of the same sign by -1 <= k <= 1; the mutual inductance is k*sqrt(L1*L2)."),
+    row("E0752", "switch makes no sense", "A switch needs two resistances other than 0 and a hysteresis that is not negative: it closes above Vt + Vh and opens below Vt - Vh."),
+    row("E0753", "diode makes no sense", "Is, N, Vj, BV, IBV and the area of a diode are above 0, M and FC from 0 to below 1."),
     // -- 08: simulation
     // -- 09: files and usage
     row("E0901", "no such file", "The file named does not exist. The message names the nearest one in the same folder."),
