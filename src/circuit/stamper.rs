@@ -80,6 +80,7 @@ impl<'a> Stamper<'a> {
                 voltage: true,
                 nominal: node.nominal,
                 device: None,
+                span: node.span,
             });
         }
         let label = |device: &Device| DeviceLabel { name: device.name.clone(), span: device.span };
