@@ -1,6 +1,116 @@
 //! The command line: one file for each subcommand, all listed in one table.
 
-/// Runs the command line and returns the process's exit code.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub mod session;
+pub mod output;
+pub mod table;
+pub mod compare;
+
+use clap::{Args, FromArgMatches};
+use session::{Exit, Global, Session};
+use std::process::ExitCode;
+
+/// Room for the deepest inputs: nesting is limited, but trees of thousands of levels are walked by recursion.
+const STACK: usize = 256 << 20;
+
+/// One subcommand.
+pub struct Command {
+    /// Its name.
+    pub name: &'static str,
+    /// Its flags, with help.
+    pub describe: fn(clap::Command) -> clap::Command,
+    /// What it does.
+    pub run: fn(&clap::ArgMatches, &mut Session) -> Result<Exit, clap::Error>,
+}
+
+macro_rules! command {
+    ($module:ident) => {
+        Command {
+            name: stringify!($module),
+            describe: |command| {
+                $module::Arguments::augment_args(command)
+                    .about($module::ABOUT)
+                    .after_help($module::EXAMPLE)
+            },
+            run: |matches, session| {
+                Ok($module::run($module::Arguments::from_arg_matches(matches)?, session))
+            },
+        }
+    };
+}
+
+/// All subcommands, in the order of the help.
+pub const COMMANDS: &[Command] = &[command!(compare)];
+
+/// The whole command line, as clap knows it.
+pub fn describe() -> clap::Command {
+    let program = clap::Command::new("bondspice")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about("Turns bond graphs into circuits, simulates them and proves the translation")
+        .after_help("Example: bondspice simulate models/eha_one_line.bg -o run.csv")
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .max_term_width(100);
+    let program = Global::augment_args(program);
+    COMMANDS.iter().fold(program, |program, row| {
+        program.subcommand((row.describe)(clap::Command::new(row.name)))
+    })
+}
+
+/// Runs the command line of this process and returns its exit code.
+pub fn main() -> ExitCode {
+    let worker = std::thread::Builder::new().stack_size(STACK).spawn(|| {
+        let arguments: Vec<std::ffi::OsString> = std::env::args_os().collect();
+        run(arguments)
+    });
+    match worker.map(std::thread::JoinHandle::join) {
+        Ok(Ok(exit)) => ExitCode::from(exit as u8),
+        // A panic has been reported by its own message; the work was not finished.
+        Ok(Err(_)) => ExitCode::from(Exit::Simulation as u8),
+        Err(_) => ExitCode::from(Exit::File as u8),
+    }
+}
+
+/// Runs a command line, the program's name first.
+pub fn run(arguments: Vec<std::ffi::OsString>) -> Exit {
+    let matches = match describe().try_get_matches_from(arguments) {
+        Ok(matches) => matches,
+        Err(error) => return explain(&error),
+    };
+    let global = Global::from_arg_matches(&matches).unwrap_or_default();
+    let mut session = Session::new(global);
+    let Some((name, matches)) = matches.subcommand() else { return Exit::Usage };
+    let Some(row) = COMMANDS.iter().find(|row| row.name == name) else { return Exit::Usage };
+    match (row.run)(matches, &mut session) {
+        Ok(exit) => {
+            session.close();
+            exit
+        }
+        Err(error) => explain(&error),
+    }
+}
+
+/// Prints clap's message: help and version on stdout, errors on stderr.
+fn explain(error: &clap::Error) -> Exit {
+    // Where nobody reads it, nobody misses it.
+    let _ = error.print();
+    if error.use_stderr() { Exit::Usage } else { Exit::Fine }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        describe().debug_assert();
+        for row in COMMANDS {
+            let command = (row.describe)(clap::Command::new(row.name));
+            assert!(command.get_about().is_some(), "{}", row.name);
+            let example = command.get_after_help().expect(row.name).to_string();
+            assert!(example.contains(&format!("bondspice {}", row.name)), "{example}");
+            for argument in command.get_arguments() {
+                assert!(argument.get_help().is_some(), "{} {}", row.name, argument.get_id());
+            }
+        }
+    }
 }

@@ -68,6 +68,9 @@ pub const CODES: &[Code] = &[
     row("E0924", "trace has no rows", "There is a header, or nothing at all, and no row of numbers."),
     row("E0925", "two columns of one name", "Columns are told apart by their names. Give one of them another name with `as`."),
     row("E0926", "time falls", "The first column of a trace must not decrease, and must hold numbers."),
+    row("E0940", "wrong use of a flag", "The message says which flag and what it takes; `--help` shows an example."),
+    row("E0941", "unknown format", "The format of a result follows from --format, else from the ending of -o: csv, raw, json."),
+    row("E0942", "nothing to compare", "No signal of the reference has a column in the trace. Pair names that differ with --signals."),
 ];
 
 /// The row of a code.
