@@ -43,14 +43,13 @@ pub const COMMANDS: &[Command] = &[command!(compare)];
 
 /// The whole command line, as clap knows it.
 pub fn describe() -> clap::Command {
-    let program = clap::Command::new("bondspice")
+    let program = Global::augment_args(clap::Command::new("bondspice"))
         .version(env!("CARGO_PKG_VERSION"))
         .about("Turns bond graphs into circuits, simulates them and proves the translation")
         .after_help("Example: bondspice simulate models/eha_one_line.bg -o run.csv")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .max_term_width(100);
-    let program = Global::augment_args(program);
     COMMANDS.iter().fold(program, |program, row| {
         program.subcommand((row.describe)(clap::Command::new(row.name)))
     })

@@ -142,7 +142,7 @@ impl Session {
     pub fn load_trace(&mut self, path: &str) -> Result<Trace, Exit> {
         self.remember(path);
         let bytes = loader::read_data(path).map_err(|error| self.fail(error))?;
-        formats::read(path, &bytes).map_err(|diagnostic| self.fail(diagnostic))
+        formats::read(path, &bytes).map_err(|diagnostic| self.fail(*diagnostic))
     }
 
     /// Reads a small text of data; says why it cannot be.

@@ -1,8 +1,7 @@
 //! Traces as CSV (RFC 4180): a header, one row a point, the shortest numbers that read back the same.
 
-use super::formats::{Heading, bad};
+use super::formats::{Failed, Heading, bad, worse};
 use super::{Sink, Trace};
-use crate::diagnostic::Diagnostic;
 use std::io::{self, Write};
 
 /// Writes rows as they come.
@@ -77,7 +76,7 @@ pub fn write(trace: &Trace, heading: &Heading, to: &mut dyn Write) -> io::Result
 }
 
 /// Reads a trace; commas, semicolons or tabs separate, whichever the header holds.
-pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
+pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let header = bytes.split(|byte| *byte == b'\n').next().unwrap_or(bytes);
     let separator = *b",;\t".iter().find(|byte| header.contains(byte)).unwrap_or(&b',');
@@ -90,7 +89,7 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
     let mut record = ::csv::StringRecord::new();
     let mut next = |record: &mut ::csv::StringRecord| {
         reader.read_record(record).map_err(|error| match error.position() {
-            Some(place) => bad("E0921", "the table is no text").because(at(place.line())),
+            Some(place) => worse("E0921", "the table is no text", at(place.line())),
             None => bad("E0921", format!("the table cannot be read: {error}")),
         })
     };
@@ -104,13 +103,13 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
         let line = record.position().map_or(0, ::csv::Position::line);
         if record.len() != width {
             let message = format!("a row has {} fields, the header {width}", record.len());
-            return Err(bad("E0921", message).because(at(line)));
+            return Err(worse("E0921", message, at(line)));
         }
         for (field, (column, name)) in record.iter().zip(trace.columns.iter_mut().zip(&trace.names))
         {
             let value: f64 = field.parse().map_err(|_| {
-                bad("E0921", format!("`{field}` is no number"))
-                    .because(format!("{}, column `{name}`", at(line)))
+                let place = format!("{}, column `{name}`", at(line));
+                worse("E0921", format!("`{field}` is no number"), place)
             })?;
             column.push(value);
         }

@@ -25,7 +25,7 @@ pub struct Format {
     /// Writes a whole trace.
     pub write: fn(&Trace, &Heading, &mut dyn Write) -> io::Result<()>,
     /// Reads a whole trace. Of several, the last.
-    pub read: fn(&[u8]) -> Result<Trace, Diagnostic>,
+    pub read: fn(&[u8]) -> Result<Trace, Failed>,
     /// Whether a file that begins so is probably one.
     pub recognises: fn(&[u8]) -> bool,
 }
@@ -73,7 +73,7 @@ pub fn by_ending(path: &str) -> Option<&'static Format> {
 ///
 /// # Errors
 /// Says what is wrong with the content.
-pub fn read(name: &str, bytes: &[u8]) -> Result<Trace, Diagnostic> {
+pub fn read(name: &str, bytes: &[u8]) -> Result<Trace, Failed> {
     let format = FORMATS.iter().find(|format| (format.recognises)(bytes));
     let trace = match format {
         Some(format) => (format.read)(bytes),
@@ -87,7 +87,7 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Trace, Diagnostic> {
 }
 
 /// A trace must have an abscissa that does not fall, and no two columns of one name.
-fn check(trace: &Trace) -> Result<(), Diagnostic> {
+fn check(trace: &Trace) -> Result<(), Failed> {
     if trace.names.is_empty() || trace.rows() == 0 {
         return Err(bad("E0924", "the trace has no rows"));
     }
@@ -97,17 +97,27 @@ fn check(trace: &Trace) -> Result<(), Diagnostic> {
         }
     }
     let time = trace.time();
-    if let Some(row) = time.windows(2).position(|pair| !(pair[0] <= pair[1])) {
+    if let Some(row) =
+        time.windows(2).position(|pair| pair[0].partial_cmp(&pair[1]).is_none_or(|o| o.is_gt()))
+    {
         let (a, b) = (time[row], time[row + 1]);
-        return Err(bad("E0926", format!("`{}` goes from {a} to {b}", trace.names[0]))
-            .because(format!("at row {} of {}", row + 2, time.len())));
+        let message = format!("`{}` goes from {a} to {b}", trace.names[0]);
+        return Err(worse("E0926", message, format!("at row {} of {}", row + 2, time.len())));
     }
     Ok(())
 }
 
+/// Why a trace cannot be read.
+pub type Failed = Box<Diagnostic>;
+
 /// An error about content, without a place in a text.
-pub(super) fn bad(code: &'static str, message: impl Into<String>) -> Diagnostic {
-    Diagnostic::error(code, Span::NONE, message)
+pub(super) fn bad(code: &'static str, message: impl Into<String>) -> Failed {
+    Box::new(Diagnostic::error(code, Span::NONE, message))
+}
+
+/// The same with a fact about it.
+pub(super) fn worse(code: &'static str, message: impl Into<String>, note: String) -> Failed {
+    Box::new(bad(code, message).because(note))
 }
 
 #[cfg(test)]

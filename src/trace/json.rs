@@ -1,8 +1,7 @@
 //! Traces as JSON: `{"schema": 1, "names": […], "units": […], "columns": [[…], …]}`.
 
 use super::Trace;
-use super::formats::{Heading, bad};
-use crate::diagnostic::Diagnostic;
+use super::formats::{Failed, Heading, bad, worse};
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 
@@ -31,9 +30,9 @@ pub fn write(trace: &Trace, _: &Heading, to: &mut dyn Write) -> io::Result<()> {
 }
 
 /// Reads a trace; `null` is NaN.
-pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
+pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     let trace: In = serde_json::from_slice(bytes)
-        .map_err(|error| bad("E0923", "not the JSON of a trace").because(error.to_string()))?;
+        .map_err(|error| worse("E0923", "not the JSON of a trace", error.to_string()))?;
     let In { names, mut units, columns } = trace;
     let rows = columns.first().map_or(0, Vec::len);
     if columns.len() != names.len() || columns.iter().any(|column| column.len() != rows) {

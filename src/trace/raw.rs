@@ -4,9 +4,8 @@
 //! in when the run is over; so do we. `Command:` stands after it, where other readers look for the version. Names
 //! may hold no blanks there: they become underscores.
 
-use super::formats::{Heading, bad};
+use super::formats::{Failed, Heading, bad, worse};
 use super::{Sink, Trace};
-use crate::diagnostic::Diagnostic;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// More variables than this are not believed.
@@ -108,7 +107,7 @@ pub fn recognises(bytes: &[u8]) -> bool {
 }
 
 /// Reads the last run of a RAW file, binary or ASCII, real or complex (as columns `name.re`, `name.im`).
-pub fn read(bytes: &[u8]) -> Result<Trace, Diagnostic> {
+pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     if bytes.starts_with(b"T\0") {
         return Err(bad("E0922", "RAW files in UTF-16, as LTspice writes them, cannot be read"));
     }
@@ -134,7 +133,7 @@ struct Header {
     binary: bool,
 }
 
-fn read_run(bytes: &[u8]) -> Result<(Trace, &[u8]), Diagnostic> {
+fn read_run(bytes: &[u8]) -> Result<(Trace, &[u8]), Failed> {
     let (header, data) = read_header(bytes)?;
     let Header { complex, names, units, .. } = &header;
     let trace = if *complex {
@@ -176,15 +175,14 @@ fn read_binary<'a>(
     header: &Header,
     mut trace: Trace,
     data: &'a [u8],
-) -> Result<(Trace, &'a [u8]), Diagnostic> {
+) -> Result<(Trace, &'a [u8]), Failed> {
     let row = header.names.len() * if header.complex { 16 } else { 8 };
     // A run that was killed leaves the number of points at 0: then all that is there is taken.
     let points = if header.points == 0 { data.len() / row } else { header.points };
     let size = row.checked_mul(points).filter(|size| *size <= data.len()).ok_or_else(|| {
-        bad("E0922", "the RAW file ends too early").because(format!(
-            "{points} points of {row} bytes are announced, {} are there",
-            data.len() / row
-        ))
+        let there = data.len() / row;
+        let note = format!("{points} points of {row} bytes are announced, {there} are there");
+        worse("E0922", "the RAW file ends too early", note)
     })?;
     let (rows, rest) = data.split_at(size);
     let mut numbers = rows
@@ -200,7 +198,7 @@ fn read_ascii<'a>(
     header: &Header,
     mut trace: Trace,
     data: &'a [u8],
-) -> Result<(Trace, &'a [u8]), Diagnostic> {
+) -> Result<(Trace, &'a [u8]), Failed> {
     let end = data.windows(7).position(|w| w == b"\nTitle:").map_or(data.len(), |at| at + 1);
     let text = String::from_utf8_lossy(&data[..end]);
     let mut words = text.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
@@ -218,7 +216,7 @@ fn read_ascii<'a>(
     Ok((trace, &data[end..]))
 }
 
-fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Diagnostic> {
+fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Failed> {
     let mut header =
         Header { complex: false, points: 0, names: vec![], units: vec![], binary: false };
     let mut variables = 0;
