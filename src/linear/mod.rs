@@ -1,1 +1,24 @@
 //! Sparse linear algebra over any field: ordering, LU, replay of a fixed pattern, pivot guard.
+//!
+//! Use: [`Pattern::from_triplets`] once; [`Lu::factor`] chooses pivots; [`Lu::refactor`] replays the same elimination
+//! with new values; [`Lu::solve`]. When `refactor` reports [`Trouble`], call `factor` again.
+//!
+//! Pivots are chosen by Markowitz's rule with a threshold up to [`lu::SMALL`] unknowns, beyond that column by column
+//! in an order of minimum degree (T. A. Davis, *Direct Methods for Sparse Linear Systems*, 2006).
+
+mod degree;
+mod field;
+mod gilbert;
+mod lu;
+mod markowitz;
+mod matching;
+mod pattern;
+mod pivots;
+#[cfg(test)]
+mod tests;
+
+pub use field::{Complex, Field, Prime61};
+pub use lu::{Lu, SMALL, Trouble, backward_error};
+pub use matching::{Matching, maximum_matching};
+pub use pattern::Pattern;
+pub use pivots::{Cause, Singular};
