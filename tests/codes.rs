@@ -20,7 +20,9 @@ fn codes(text: &str) -> impl Iterator<Item = &str> {
     text.match_indices('"').filter_map(|(at, _)| {
         let code = text.get(at + 1..at + 6)?;
         let closed = text.get(at + 6..at + 7) == Some("\"");
-        let digits = code[1..].bytes().all(|byte| byte.is_ascii_digit()) && &code[1..2] == "0";
+        let digits = code.is_ascii()
+            && code[1..].bytes().all(|byte| byte.is_ascii_digit())
+            && &code[1..2] == "0";
         (closed && digits && "EWN".contains(&code[..1])).then_some(code)
     })
 }
@@ -33,10 +35,12 @@ fn codes_and_rows_belong_together() {
         bondspice::diagnostic::codes::CODES.iter().map(|row| row.code).collect();
     let mut used = BTreeSet::new();
     for (path, text) in &found {
-        if path.ends_with("codes.rs") {
+        if path.ends_with("codes.rs") || path.ends_with("tests.rs") {
             continue;
         }
-        for code in codes(text) {
+        // Tests may speak of any code.
+        let code_only = text.split("#[cfg(test)]\nmod").next().unwrap();
+        for code in codes(code_only) {
             assert!(rows.contains(code), "{path} uses {code}, which has no row");
             used.insert(code);
         }
