@@ -482,7 +482,8 @@ fn power_of_abs(x: f64, y: f64) -> f64 {
 }
 
 fn signed_power(x: f64, y: f64) -> f64 {
-    if x == 0.0 && y > 0.0 { 0.0 } else { sign(x) * power(x.abs(), y) }
+    // 0 at 0 for every y, as an odd function has it; sign·∞ would be NaN.
+    if x == 0.0 { 0.0 } else { sign(x) * power(x.abs(), y) }
 }
 
 #[cfg(test)]
@@ -528,6 +529,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
         #[test]
         fn derivatives_agree_with_finite_differences(u in -1.0..1.0f64, v in -1.0..1.0f64, w in -1.0..1.0f64) {
             for row in FUNCTIONS {

@@ -7,9 +7,13 @@ pub mod tree;
 pub mod functions;
 pub mod evaluate;
 pub mod parse;
+pub mod dag;
+pub mod program;
 #[cfg(test)]
 mod tests;
 
 pub use crate::__expression_roles as roles;
+pub use dag::{Dag, NodeId};
 pub use functions::{Dialect, FUNCTIONS, Function};
+pub use program::Program;
 pub use tree::{Binary, Expr, Node, Table, Unary};
