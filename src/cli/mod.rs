@@ -3,6 +3,7 @@
 pub mod session;
 pub mod output;
 pub mod table;
+pub mod emit;
 pub mod compare;
 
 use clap::{Args, FromArgMatches};

@@ -1,0 +1,443 @@
+//! `--emit STAGE`: each noun between the text and the result, as text, so that it can be looked at.
+
+use super::table::Table;
+use crate::bond::causality::Causality;
+use crate::bond::graph::{
+    self, BondGraph, Dissipation, Initial, Law, Modulus, Power, SignalLaw, Storage, StoreInitial,
+    StoreLaw, Stroke, Variable,
+};
+use crate::circuit::stamps::{self, Stamps};
+use crate::circuit::{self, Circuit, DeviceKind, Waveform};
+use crate::expr::{Binary, Expr, Node, Unary};
+
+/// The stages that can be looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Stage {
+    /// Parameters, signals, elements, bonds, after elaboration.
+    Graph,
+    /// Strokes, states, loops.
+    Causality,
+    /// The netlist.
+    Netlist,
+    /// Flat devices between nodes, numbers for parameters.
+    Circuit,
+    /// Unknowns and equations.
+    System,
+}
+
+/// An expression in the spelling of bond graphs; brackets stand wherever operators of different kinds meet.
+pub fn expression<L>(expr: &Expr<L>, leaf: &dyn Fn(&L) -> String) -> String {
+    let inner = |e: &Expr<L>| expression(e, leaf);
+    let operand = |e: &Expr<L>| match &*e.node {
+        Node::Unary(..) | Node::Binary(..) | Node::If(..) => format!("({})", inner(e)),
+        Node::Number(value) if *value < 0.0 => format!("({})", inner(e)),
+        _ => inner(e),
+    };
+    match &*expr.node {
+        Node::Number(value) => number(*value),
+        Node::Leaf(name) => leaf(name),
+        Node::Unary(Unary::Negate, a) => format!("-{}", operand(a)),
+        Node::Unary(Unary::Not, a) => format!("not {}", operand(a)),
+        Node::Binary(op, a, b) => format!("{} {} {}", operand(a), spelled(*op), operand(b)),
+        Node::Call(function, arguments) => {
+            let arguments: Vec<String> = arguments.iter().map(inner).collect();
+            format!("{}({})", function.row().name, arguments.join(", "))
+        }
+        Node::If(c, a, b) => format!("if {} then {} else {}", operand(c), operand(a), operand(b)),
+        Node::Table(a, table) => {
+            let points = table.x.iter().zip(&table.y);
+            let points: Vec<String> =
+                points.map(|(x, y)| format!("{}, {}", number(*x), number(*y))).collect();
+            format!("table({}, [{}])", inner(a), points.join("; "))
+        }
+    }
+}
+
+fn spelled(op: Binary) -> &'static str {
+    match op {
+        Binary::Add => "+",
+        Binary::Subtract => "-",
+        Binary::Multiply => "*",
+        Binary::Divide => "/",
+        Binary::Power => "^",
+        Binary::Less => "<",
+        Binary::LessEqual => "<=",
+        Binary::Greater => ">",
+        Binary::GreaterEqual => ">=",
+        Binary::Equal => "==",
+        Binary::NotEqual => "!=",
+        Binary::And => "and",
+        Binary::Or => "or",
+    }
+}
+
+fn number(value: f64) -> String {
+    let mut text = String::new();
+    crate::trace::csv::number(value, &mut text);
+    text
+}
+
+/// An expression of the graph, elements and signals by name.
+pub fn graph_expression(graph: &BondGraph, expr: &graph::Expr) -> String {
+    expression(expr, &|leaf| match leaf {
+        graph::Leaf::Parameter(id) => graph.parameters[id.index()].name.clone(),
+        graph::Leaf::Signal(id) => graph.signals[id.index()].name.clone(),
+        graph::Leaf::Time => "time".into(),
+        graph::Leaf::Own(Variable::Power(power)) => letter(*power).into(),
+        graph::Leaf::Own(Variable::Stored) => "stored".into(),
+        graph::Leaf::Bond { bond, variable, negated } => {
+            let sign = if *negated { "-" } else { "" };
+            format!("{sign}{}({})", letter(*variable), graph.bond_name(*bond))
+        }
+        graph::Leaf::Stored(vertex) => format!("stored({})", graph.vertex(*vertex).name),
+    })
+}
+
+fn letter(power: Power) -> &'static str {
+    match power {
+        Power::Effort => "e",
+        Power::Flow => "f",
+    }
+}
+
+/// The flat graph.
+pub fn graph(graph: &BondGraph) -> String {
+    let text = |expr: &graph::Expr| graph_expression(graph, expr);
+    let mut parameters = Table::new(&["parameter", "value", "given as"]);
+    for parameter in &graph.parameters {
+        parameters.row([parameter.name.clone(), number(parameter.value), text(&parameter.expr)]);
+    }
+    let mut signals = Table::new(&["signal", "law"]);
+    for signal in &graph.signals {
+        signals.row([signal.name.clone(), signal_law(graph, &signal.law)]);
+    }
+    let mut vertices = Table::new(&["element", "law"]);
+    for vertex in &graph.vertices {
+        vertices.row([format!("{}:{}", vertex.kind, vertex.name), law(graph, &vertex.law)]);
+    }
+    let mut bonds = Table::new(&["bond", "domain"]);
+    for id in graph.bond_ids() {
+        bonds.row([graph.bond_name(id), format!("{:?}", graph.bond(id).domain)]);
+    }
+    let mut observed = Table::new(&["observed", "value", "unit"]);
+    for item in &graph.experiment.observe {
+        let unit = if item.unit.0.is_empty() { &item.si_unit } else { &item.unit.0 };
+        observed.row([item.name.clone(), text(&item.expr), unit.clone()]);
+    }
+    let seconds = |value: Option<f64>| value.map_or("-".into(), number);
+    let experiment = &graph.experiment;
+    let mut run = Table::new(&["run", "value"]);
+    run.row(["until".into(), seconds(experiment.until)]);
+    run.row(["step".into(), seconds(experiment.step)]);
+    for (key, value) in &experiment.options {
+        run.row([key.clone(), value.clone()]);
+    }
+    let tables = [parameters, signals, vertices, bonds, observed, run];
+    let tables: Vec<String> = tables.iter().map(Table::to_text).collect();
+    format!("graph {}\n\n{}", graph.name, tables.join("\n"))
+}
+
+fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
+    let text = |expr: &graph::Expr| graph_expression(graph, expr);
+    let list = |name: &str, arguments: &[&graph::Expr]| {
+        let arguments: Vec<String> = arguments.iter().map(|a| text(a)).collect();
+        format!("{name}({})", arguments.join(", "))
+    };
+    match law {
+        SignalLaw::Algebraic(expr) => text(expr),
+        SignalLaw::Integrator { rate, initial } => {
+            format!("integ({}, {})", text(rate), initial_value(graph, initial))
+        }
+        SignalLaw::Waveform(waveform) => match waveform {
+            graph::Waveform::Step { at, before, after } => list("step", &[at, before, after]),
+            graph::Waveform::Ramp { at, slope } => list("ramp", &[at, slope]),
+            graph::Waveform::Pulse { low, high, delay, rise, fall, width, period } => {
+                list("pulse", &[low, high, delay, rise, fall, width, period])
+            }
+            graph::Waveform::Sine { offset, amplitude, frequency, delay, damping, phase } => {
+                list("sine", &[offset, amplitude, frequency, delay, damping, phase])
+            }
+            graph::Waveform::Pwl(points) => {
+                let points: Vec<String> =
+                    points.iter().map(|(t, y)| format!("{}, {}", text(t), text(y))).collect();
+                format!("pwl({})", points.join("; "))
+            }
+        },
+    }
+}
+
+fn initial_value(graph: &BondGraph, initial: &Initial) -> String {
+    match initial {
+        Initial::Given(expr) => graph_expression(graph, expr),
+        Initial::Implied => "implied".into(),
+    }
+}
+
+fn law(graph: &BondGraph, law: &Law) -> String {
+    let text = |expr: &graph::Expr| graph_expression(graph, expr);
+    let stored = |kind: &Storage| match kind {
+        Storage::Compliance => "q",
+        Storage::Inertia => "p",
+    };
+    match law {
+        Law::Zero => "common effort".into(),
+        Law::One => "common flow".into(),
+        Law::Source { detector: true, sets, .. } => format!("{} = 0, detector", letter(*sets)),
+        Law::Source { sets, value, .. } => format!("{} = {}", letter(*sets), text(value)),
+        Law::Dissipator(Dissipation::Linear(r)) => format!("e = ({})*f", text(r)),
+        Law::Dissipator(Dissipation::Effort(law)) => format!("e = {}", text(law)),
+        Law::Dissipator(Dissipation::Flow(law)) => format!("f = {}", text(law)),
+        Law::Store { kind, law, initial } => {
+            let (gives, stored) = (letter(kind.gives()), stored(kind));
+            let law = match law {
+                StoreLaw::Linear(c) => format!("{gives} = {stored}/({})", text(c)),
+                StoreLaw::OfStored(law) => format!("{gives} = {}", text(law)),
+                StoreLaw::OfPower(law) => format!("{stored} = {}", text(law)),
+            };
+            let initial = match initial {
+                StoreInitial::Stored(value) => format!(", {stored}0 = {}", text(value)),
+                StoreInitial::Power(value) => format!(", {gives}0 = {}", text(value)),
+                StoreInitial::Unstated => String::new(),
+            };
+            law + &initial
+        }
+        Law::Rate { kind, rate, initial } => {
+            let gives = letter(kind.gives());
+            format!("der({gives}) = {}, {gives}0 = {}", text(rate), initial_value(graph, initial))
+        }
+        Law::Transformer(modulus) => format!("transformer, {}", self::modulus(graph, modulus)),
+        Law::Gyrator(modulus) => format!("gyrator, {}", self::modulus(graph, modulus)),
+    }
+}
+
+fn modulus(graph: &BondGraph, modulus: &Modulus) -> String {
+    match modulus {
+        Modulus::Ratio(ratio) => format!("ratio {}", graph_expression(graph, ratio)),
+        Modulus::Gain(gain) => format!("gain {}", graph_expression(graph, gain)),
+    }
+}
+
+/// Strokes, states, what depends on what, algebraic loops.
+pub fn causality(graph: &BondGraph, causality: &Causality) -> String {
+    let mut text = String::new();
+    for (id, stroke) in graph.bond_ids().zip(&causality.strokes) {
+        let bond = graph.bond(id);
+        let (from, to) = (&graph.vertex(bond.from.vertex), &graph.vertex(bond.to.vertex));
+        let arrow = match stroke {
+            Some(Stroke::AtFrom) => "|->",
+            Some(Stroke::AtTo) => "->|",
+            None => "->",
+        };
+        text += &format!("{} {arrow} {}\n", from.name, to.name);
+    }
+    let names = |ids: &[graph::VertexId]| -> String {
+        let names: Vec<String> = ids
+            .iter()
+            .map(|id| format!("{}:{}", graph.vertex(*id).kind, graph.vertex(*id).name))
+            .collect();
+        names.join(", ")
+    };
+    text += &format!("\norder {}", causality.order);
+    if !causality.states.is_empty() {
+        text += &format!("; storages in integral causality: {}", names(&causality.states));
+    }
+    text.push('\n');
+    for dependent in &causality.dependent {
+        let storage = names(&[dependent.storage]);
+        let path = path(graph, &dependent.path);
+        text += &format!("{storage} depends on {} (path {path})\n", names(&dependent.on));
+    }
+    for algebraic in &causality.loops {
+        let path = path(graph, &algebraic.path);
+        text += &format!("algebraic loop of {} (path {path})\n", names(&algebraic.elements));
+    }
+    text
+}
+
+fn path(graph: &BondGraph, path: &[graph::BondId]) -> String {
+    let bonds: Vec<String> = path.iter().map(|id| graph.bond_name(*id)).collect();
+    bonds.join(", ")
+}
+
+/// The flat circuit.
+pub fn circuit(circuit: &Circuit) -> String {
+    let node = |id: circuit::NodeId| {
+        circuit.nodes.get(id.0 as usize).map_or("?", |node| node.name.as_str()).to_string()
+    };
+    let device = |id: circuit::DeviceId| {
+        circuit.devices.get(id.0 as usize).map_or("?", |d| d.name.as_str()).to_string()
+    };
+    let text = |expr: &circuit::Expr| {
+        expression(expr, &|leaf| match leaf {
+            circuit::Leaf::Voltage(a, b) if b.0 == 0 => format!("v({})", node(*a)),
+            circuit::Leaf::Voltage(a, b) => format!("v({}, {})", node(*a), node(*b)),
+            circuit::Leaf::Current(id) => format!("i({})", device(*id)),
+            circuit::Leaf::Time => "time".into(),
+        })
+    };
+    let start =
+        |initial: &Option<f64>| initial.map_or(String::new(), |v| format!(" ic={}", number(v)));
+    let mut table = Table::new(&["device", "nodes", "value"]);
+    for row in &circuit.devices {
+        let nodes: Vec<String> = row.nodes.iter().map(|id| node(*id)).collect();
+        let value = match &row.kind {
+            DeviceKind::Resistor { resistance } => number(*resistance),
+            DeviceKind::Capacitor { capacitance: value, initial }
+            | DeviceKind::Inductor { inductance: value, initial } => {
+                number(*value) + &start(initial)
+            }
+            DeviceKind::Mutual { inductors: [a, b], coupling } => {
+                format!("{} {} {}", device(*a), device(*b), number(*coupling))
+            }
+            DeviceKind::VoltageSource { waveform } | DeviceKind::CurrentSource { waveform } => {
+                self::waveform(waveform)
+            }
+            DeviceKind::Vcvs { gain, control: [a, b] }
+            | DeviceKind::Vccs { gain, control: [a, b] } => {
+                format!("{} * v({}, {})", number(*gain), node(*a), node(*b))
+            }
+            DeviceKind::Cccs { gain, control } | DeviceKind::Ccvs { gain, control } => {
+                format!("{} * i({})", number(*gain), device(*control))
+            }
+            DeviceKind::BehaviouralVoltage { law } => format!("v = {}", text(law)),
+            DeviceKind::BehaviouralCurrent { law } => format!("i = {}", text(law)),
+            DeviceKind::Switch { control, on, off, on_resistance, off_resistance, .. } => format!(
+                "switch by {}: on above {} ({} Ohm), off below {} ({} Ohm)",
+                text(control),
+                number(*on),
+                number(*on_resistance),
+                number(*off),
+                number(*off_resistance)
+            ),
+            DeviceKind::Diode { model, area } => {
+                format!("diode is={} area={}", number(model.saturation_current), number(*area))
+            }
+        };
+        table.row([row.name.clone(), nodes.join(" "), value]);
+    }
+    let mut outputs = Table::new(&["output", "value"]);
+    for output in &circuit.outputs {
+        outputs.row([output.name.clone(), text(&output.expr)]);
+    }
+    let mut rest = String::new();
+    for (node_id, value) in &circuit.initial {
+        rest += &format!("initially v({}) = {}\n", node(*node_id), number(*value));
+    }
+    for analysis in &circuit.analyses {
+        rest += &format!("{analysis:?}\n");
+    }
+    for (key, value) in &circuit.options {
+        rest += &format!("option {key} = {value}\n");
+    }
+    format!("circuit {}\n\n{}\n{}\n{rest}", circuit.title, table.to_text(), outputs.to_text())
+}
+
+fn waveform(waveform: &Waveform) -> String {
+    match waveform {
+        Waveform::Constant(value) => number(*value),
+        Waveform::Pwl(points) => {
+            let points: Vec<String> =
+                points.iter().map(|(t, y)| format!("{} {}", number(*t), number(*y))).collect();
+            format!("pwl({})", points.join(" "))
+        }
+        other => format!("{other:?}"),
+    }
+}
+
+/// Unknowns and equations, as the simulator gets them.
+pub fn system(stamps: &Stamps) -> String {
+    let unknown = |id: stamps::UnknownId| stamps.unknowns[id.0 as usize].name.clone();
+    let text = |law: &stamps::Law| {
+        expression(law, &|leaf| match leaf {
+            stamps::Leaf::Unknown(id) => unknown(*id),
+            stamps::Leaf::Rate(k) => format!("der(Q{k})"),
+            stamps::Leaf::Time => "time".into(),
+            stamps::Leaf::Mode(k) => format!("mode{k}"),
+        })
+    };
+    let name = |id: circuit::DeviceId| {
+        stamps.devices.get(id.0 as usize).map_or("?", |d| d.name.as_str()).to_string()
+    };
+    let mut left = vec![vec![]; stamps.unknowns.len()];
+    let mut right = vec![vec![]; stamps.unknowns.len()];
+    for (row, column, value) in &stamps.conductances {
+        left[row.0 as usize].push(term(*value, &unknown(*column)));
+    }
+    for stamp in &stamps.laws {
+        for (row, factor) in &stamp.into {
+            left[row.0 as usize].push(term(*factor, &format!("({})", text(&stamp.law))));
+        }
+    }
+    for (k, charge) in stamps.charges.iter().enumerate() {
+        for (row, factor) in &charge.into {
+            left[row.0 as usize].push(term(*factor, &format!("der(Q{k})")));
+        }
+    }
+    for source in &stamps.sources {
+        for (row, factor) in &source.into {
+            right[row.0 as usize].push(term(*factor, &name(source.device)));
+        }
+    }
+    let sum = |terms: &Vec<String>| if terms.is_empty() { "0".into() } else { terms.join(" + ") };
+    let mut out = String::from("equations\n");
+    for (row, unknown) in stamps.unknowns.iter().enumerate() {
+        out += &format!("{}: {} = {}\n", unknown.name, sum(&left[row]), sum(&right[row]));
+    }
+    out += "\ncharges and fluxes\n";
+    for (k, charge) in stamps.charges.iter().enumerate() {
+        let mut terms: Vec<String> =
+            charge.linear.iter().map(|(id, value)| term(*value, &unknown(*id))).collect();
+        terms.extend(charge.law.iter().map(text));
+        let start = charge.initial.map_or(String::new(), |q| format!(", at first {}", number(q)));
+        out += &format!("Q{k} of {} = {}{start}\n", name(charge.device), sum(&terms));
+    }
+    if !stamps.sources.is_empty() {
+        out += "\nsources\n";
+    }
+    for source in &stamps.sources {
+        out += &format!("{} = {}\n", name(source.device), waveform(&source.waveform));
+    }
+    for (k, mode) in stamps.modes.iter().enumerate() {
+        let control = text(&mode.control);
+        let (on, off) = (number(mode.on), number(mode.off));
+        out += &format!(
+            "mode{k} of {}: 1 above {on}, 0 below {off} of {control}\n",
+            name(mode.device)
+        );
+    }
+    out += "\noutputs\n";
+    for (name, law) in &stamps.outputs {
+        out += &format!("{name} = {}\n", text(law));
+    }
+    out
+}
+
+fn term(factor: f64, what: &str) -> String {
+    if factor == 1.0 {
+        what.to_string()
+    } else if factor == -1.0 {
+        format!("-{what}")
+    } else {
+        format!("{}*{what}", number(factor))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::Function;
+
+    #[test]
+    fn expressions_keep_their_meaning_in_brackets() {
+        let leaf = |name: &'static str| Expr::leaf(name);
+        let sum = leaf("a").binary(Binary::Add, Expr::number(-2.0));
+        let product = sum.clone().binary(Binary::Multiply, leaf("b"));
+        let power = product.clone().negate().binary(Binary::Power, Expr::number(0.5));
+        let call = Expr::call(Function::Clamp, vec![power, leaf("lo"), leaf("hi")]);
+        let spell = |e: &Expr<&'static str>| expression(e, &|name| name.to_string());
+        assert_eq!(spell(&product), "(a + (-2)) * b");
+        assert_eq!(spell(&call), "clamp((-((a + (-2)) * b)) ^ 0.5, lo, hi)");
+        let choice = Expr::choice(leaf("c"), sum, leaf("b"));
+        assert_eq!(spell(&choice), "if c then (a + (-2)) else b");
+    }
+}
