@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod parse;
 pub mod dag;
 pub mod program;
+pub mod print;
 #[cfg(test)]
 mod tests;
 

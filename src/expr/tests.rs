@@ -1,11 +1,13 @@
 //! Tests of the shared grammar through two small languages, one for each dialect.
 
 use super::parse::{self, Language, MAX_DEPTH, MAX_NESTING};
-use super::{Binary, Dialect, Expr, Function, Node, roles};
+use super::print::print;
+use super::{Binary, Dialect, Expr, Function, Node, Unary, roles};
 use crate::diagnostic::Diagnostic;
 use crate::source::{FileId, Span};
 use pest::Parser;
 use pest::iterators::Pair;
+use proptest::prelude::*;
 
 mod bond {
     #[derive(pest_derive::Parser)]
@@ -257,4 +259,201 @@ fn functions_have_names_in_both() {
         super::functions::find(Dialect::Ngspice, "PWR"),
         Some(super::functions::Meaning::Function(Function::SignedPower))
     ));
+}
+
+fn bond_text(text: &str) -> String {
+    print(&parse_bond(text).unwrap(), Dialect::Bond, &mut |name| name.clone())
+}
+
+fn spice_text(text: &str) -> String {
+    print(&parse_bond(text).unwrap(), Dialect::Ngspice, &mut |name| format!("v({name})"))
+}
+
+#[test]
+fn bond_text_has_only_the_brackets_it_needs() {
+    for text in [
+        "a+b*c",
+        "(a+b)*c",
+        "a-(b-c)",
+        "a/(b*c)",
+        "a/b*c",
+        "(-2)^2",
+        "-2^2",
+        "2^3^2",
+        "(2^3)^2",
+        "2^(-1)",
+        "a-(-b)",
+        "a*(-b)",
+        "not (a and b)",
+        "not a and b",
+        "not a == b",
+        "a < b and (c or d)",
+        "if a < b then 1 else if c then 2 else 3",
+        "1+(if a then b else c)",
+        "clamp(x, -1, 1e-9)",
+        "0.0017*sqrt(x^2+1.5e10)",
+    ] {
+        assert_eq!(bond_text(text), text);
+    }
+}
+
+#[test]
+fn netlist_text_is_safe_for_signs() {
+    for (text, expected) in [
+        ("x^2", "v(x)*v(x)"),
+        ("(x+1)^3", "(v(x)+1)*(v(x)+1)*(v(x)+1)"),
+        ("2*x^2", "2*(v(x)*v(x))"),
+        ("x^-1", "1/v(x)"),
+        ("x^0.5", "sqrt(v(x))"),
+        ("x^1.5", "v(x)*sqrt(v(x))"),
+        ("x^0.3", "exp(0.3*ln(v(x)))"),
+        ("x^11", "sgn(v(x))*exp(11*ln(abs(v(x))))"),
+        ("signpow(x, 0.5)", "sgn(v(x))*sqrt(abs(v(x)))"),
+        ("abspow(x, 3)", "abs(v(x))*abs(v(x))*abs(v(x))"),
+        ("clamp(x, -1, 1)", "min(max(v(x),-1),1)"),
+        ("if x > 1 and not y then x else -x", "(((v(x) > 1) && (!(v(y)))) ? (v(x)) : (-v(x)))"),
+        ("a-(-b)", "v(a)-(-v(b))"),
+        ("mod(x, 2)", "v(x)-2*floor(v(x)/2)"),
+    ] {
+        assert_eq!(spice_text(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn numbers_read_back_the_same() {
+    for (value, text) in [
+        (0.1, "0.1"),
+        (250.0, "250"),
+        (1e7, "1e7"),
+        (0.0017, "0.0017"),
+        (5.581295990097347e-7, "5.581295990097347e-7"),
+        (1.0 / 3.0, "0.3333333333333333"),
+        (-2e12, "-2e12"),
+    ] {
+        assert_eq!(super::print::number(value), text);
+        assert_eq!(text.parse::<f64>().unwrap(), value);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn printed_trees_read_back_the_same(expr in trees()) {
+        let text = print(&expr, Dialect::Bond, &mut |name| name.clone());
+        let again = parse_bond(&text).unwrap();
+        prop_assert_eq!(print(&again, Dialect::Bond, &mut |name| name.clone()), text.clone());
+        let at = |e: &Expr<String>| e.evaluate(&mut |name| name.len() as f64 * 0.37);
+        let (before, after) = (at(&expr), at(&again));
+        prop_assert!(before.to_bits() == after.to_bits() || before.is_nan() && after.is_nan(), "{}", text);
+    }
+
+    #[test]
+    fn netlist_text_means_the_same(expr in trees()) {
+        let text = print(&expr, Dialect::Ngspice, &mut |name| name.clone());
+        let again = parse_spice(&text).unwrap();
+        let at = |e: &Expr<String>| e.evaluate(&mut |name| name.len() as f64 * 0.37 - 0.5);
+        let (before, after) = (at(&expr), at(&again));
+        if tame(&expr) {
+            prop_assert!((before - after).abs() <= 1e-9 * (1.0 + before.abs()), "{}: {} {}", text, before, after);
+        }
+    }
+}
+
+/// Whether all values on the way are finite and of common size.
+fn tame(expr: &Expr<String>) -> bool {
+    let inner = match &*expr.node {
+        Node::Number(_) | Node::Leaf(_) => true,
+        Node::Unary(_, a) | Node::Table(a, _) => tame(a),
+        Node::Binary(op, a, b) => {
+            // Where rounding decides, texts may differ: comparisons of equal values are left out.
+            let difference =
+                || (a.clone() - b.clone()).evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5);
+            let decides = matches!(
+                op,
+                Binary::Less
+                    | Binary::LessEqual
+                    | Binary::Greater
+                    | Binary::GreaterEqual
+                    | Binary::Equal
+                    | Binary::NotEqual
+            );
+            let base = *op != Binary::Power
+                || a.evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5).abs() > 1e-9;
+            tame(a) && tame(b) && base && (!decides || difference().abs() > 1e-9)
+        }
+        Node::Call(function, arguments) => {
+            let at = |e: &Expr<String>| e.evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5);
+            let jumps = matches!(
+                function,
+                Function::Floor
+                    | Function::Mod
+                    | Function::PowerOfAbs
+                    | Function::Sign
+                    | Function::Atan2
+                    | Function::SignedPower
+            );
+            let smooth = !jumps
+                || arguments.iter().all(|a| (at(a) - at(a).round()).abs() > 1e-6)
+                    && (*function != Function::Mod || {
+                        let r = at(&arguments[0]) / at(&arguments[1]);
+                        (r - r.round()).abs() > 1e-6
+                    });
+            arguments.iter().all(tame) && smooth
+        }
+        Node::If(c, a, b) => tame(c) && tame(a) && tame(b),
+    };
+    inner && expr.evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5).abs() < 1e6
+}
+
+/// Trees over names, of every operation and function but tables.
+fn trees() -> impl Strategy<Value = Expr<String>> {
+    let leaf = prop_oneof![
+        prop_oneof![Just("x"), Just("yy"), Just("zzz")].prop_map(|n| Expr::leaf(n.to_string())),
+        prop_oneof![
+            Just(0.0),
+            Just(1.0),
+            Just(-1.0),
+            Just(2.0),
+            Just(0.5),
+            Just(1e-9),
+            -3.0..3.0f64
+        ]
+        .prop_map(Expr::number),
+    ];
+    leaf.prop_recursive(4, 30, 3, |inner| {
+        let binary = (0..13usize, inner.clone(), inner.clone()).prop_map(|(op, a, b)| {
+            use Binary::*;
+            let ops = [
+                Add,
+                Subtract,
+                Multiply,
+                Divide,
+                Power,
+                Less,
+                LessEqual,
+                Greater,
+                GreaterEqual,
+                Equal,
+                NotEqual,
+                And,
+                Or,
+            ];
+            a.binary(ops[op], b)
+        });
+        let call = (0..super::FUNCTIONS.len(), prop::collection::vec(inner.clone(), 3)).prop_map(
+            |(k, mut arguments)| {
+                let row = &super::FUNCTIONS[k];
+                arguments.truncate(row.value.arguments());
+                Expr::call(row.function, arguments)
+            },
+        );
+        prop_oneof![
+            4 => binary,
+            2 => call,
+            1 => inner.clone().prop_map(|a| if a.as_number().is_some() { a } else { -a }),
+            1 => inner.clone().prop_map(|a| Expr::new(Node::Unary(Unary::Not, a), Span::NONE)),
+            1 => (inner.clone(), inner.clone(), inner).prop_map(|(c, a, b)| Expr::choice(c, a, b)),
+        ]
+    })
 }

@@ -1,0 +1,279 @@
+//! Expressions as text: as `.bg` files write them, and as netlists for ngspice do.
+//!
+//! Text for netlists must mean the same in every reader and never rest on a sign convention: `^`, `pow` and `pwr`
+//! differ between simulators (and between versions of one), so whole powers become products and other powers go
+//! through `exp` and `ln`; limits are `min(max())`; tables hold their ends by clamping the argument of `pwl`, which
+//! would extrapolate; numbers carry no suffix.
+
+use super::functions::{Dialect, Function, Slot, Spelling, Template};
+use super::tree::{Binary, Expr, Node, Table, Unary};
+
+/// Whole powers up to this are written as products.
+const LONGEST_PRODUCT: u32 = 8;
+/// Products of longer text than this are not written out.
+const LONGEST_TEXT: usize = 2000;
+
+/// Writes an expression; `leaf` gives the text of a leaf, which must stand as an operand as it is.
+///
+/// In `.bg` spelling the text reads back as the same tree.
+pub fn print<L>(expr: &Expr<L>, dialect: Dialect, leaf: &mut dyn FnMut(&L) -> String) -> String {
+    piece(expr, dialect, &mut |name| Piece::atom(leaf(name))).text
+}
+
+/// The shortest digits that read back as the same number: plain between 0.001 and a million, else with an exponent.
+pub fn number(value: f64) -> String {
+    if value.is_nan() {
+        return "(0/0)".to_string();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "1e999" } else { "-1e999" }.to_string();
+    }
+    let size = value.abs();
+    if size == 0.0 || (1e-3..1e7).contains(&size) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// A text and how tightly its outermost operator binds.
+#[derive(Clone, Debug)]
+struct Piece {
+    text: String,
+    level: u8,
+}
+
+// Levels, from the loosest; the numbers of `parse::precedence`, but that a sign is written as loosely as a sum, so
+// that it stands in brackets within products.
+const CONDITIONAL: u8 = 0;
+const OR: u8 = 1;
+const AND: u8 = 2;
+const NOT: u8 = 3;
+const COMPARISON: u8 = 4;
+const SUM: u8 = 5;
+const PRODUCT: u8 = 6;
+const POWER: u8 = 8;
+const ATOM: u8 = 9;
+
+impl Piece {
+    fn atom(text: String) -> Piece {
+        Piece { text, level: ATOM }
+    }
+
+    fn new(text: String, level: u8) -> Piece {
+        Piece { text, level }
+    }
+
+    fn number(value: f64) -> Piece {
+        let level =
+            if value < 0.0 || (value == 0.0 && value.is_sign_negative()) { SUM } else { ATOM };
+        Piece { text: number(value), level }
+    }
+
+    /// In one pair of brackets.
+    fn bracketed(&self) -> String {
+        if self.level == ATOM && self.text.starts_with('(') {
+            self.text.clone()
+        } else {
+            format!("({})", self.text)
+        }
+    }
+
+    /// In brackets unless it binds at least as tightly as `level`.
+    fn at(&self, level: u8) -> String {
+        if self.level >= level { self.text.clone() } else { format!("({})", self.text) }
+    }
+}
+
+fn piece<L>(expr: &Expr<L>, dialect: Dialect, leaf: &mut dyn FnMut(&L) -> Piece) -> Piece {
+    let spice = dialect == Dialect::Ngspice;
+    match &*expr.node {
+        Node::Number(value) => Piece::number(*value),
+        Node::Leaf(name) => leaf(name),
+        Node::Unary(Unary::Negate, a) => {
+            Piece::new(format!("-{}", piece(a, dialect, leaf).at(PRODUCT + 1)), SUM)
+        }
+        Node::Unary(Unary::Not, a) => {
+            let a = piece(a, dialect, leaf);
+            if spice {
+                Piece::atom(format!("(!{})", a.bracketed()))
+            } else {
+                Piece::new(format!("not {}", a.at(NOT)), NOT)
+            }
+        }
+        Node::Binary(Binary::Power, a, b) if spice => {
+            let (base, exponent) = (piece(a, dialect, leaf), piece(b, dialect, leaf));
+            real_power(&base, b.constant(), &exponent)
+        }
+        Node::Binary(op, a, b) => {
+            binary(*op, &piece(a, dialect, leaf), &piece(b, dialect, leaf), spice)
+        }
+        Node::Call(function, arguments) => {
+            let pieces: Vec<Piece> = arguments.iter().map(|a| piece(a, dialect, leaf)).collect();
+            let exponent = arguments.get(1).and_then(Expr::constant);
+            call(*function, &pieces, exponent, dialect)
+        }
+        Node::If(c, a, b) => {
+            let c = piece(c, dialect, leaf);
+            let a = piece(a, dialect, leaf);
+            let b = piece(b, dialect, leaf);
+            if spice {
+                let (c, a, b) = (c.bracketed(), a.bracketed(), b.bracketed());
+                Piece::atom(format!("({c} ? {a} : {b})"))
+            } else {
+                let text = format!("if {} then {} else {}", c.at(OR), a.at(OR), b.text);
+                Piece::new(text, CONDITIONAL)
+            }
+        }
+        Node::Table(a, table) => interpolation(&piece(a, dialect, leaf), table, spice),
+    }
+}
+
+fn binary(op: Binary, a: &Piece, b: &Piece, spice: bool) -> Piece {
+    let (sign, level, left, right) = match op {
+        Binary::Add => ("+", SUM, SUM, SUM + 1),
+        Binary::Subtract => ("-", SUM, SUM, SUM + 1),
+        Binary::Multiply => ("*", PRODUCT, PRODUCT, PRODUCT + 1),
+        Binary::Divide => ("/", PRODUCT, PRODUCT, PRODUCT + 1),
+        Binary::Power => ("^", POWER, ATOM, POWER),
+        Binary::Less => (" < ", COMPARISON, SUM, SUM),
+        Binary::LessEqual => (" <= ", COMPARISON, SUM, SUM),
+        Binary::Greater => (" > ", COMPARISON, SUM, SUM),
+        Binary::GreaterEqual => (" >= ", COMPARISON, SUM, SUM),
+        Binary::Equal => (" == ", COMPARISON, SUM, SUM),
+        Binary::NotEqual => (" != ", COMPARISON, SUM, SUM),
+        Binary::And => (if spice { " && " } else { " and " }, AND, AND, NOT),
+        Binary::Or => (if spice { " || " } else { " or " }, OR, OR, AND),
+    };
+    if spice && level <= COMPARISON {
+        // Precedences of comparisons and logic differ between simulators: brackets everywhere.
+        let text = format!("({}{sign}{})", a.at(PRODUCT), b.at(PRODUCT));
+        return Piece::atom(text);
+    }
+    Piece::new(format!("{}{sign}{}", a.at(left), b.at(right)), level)
+}
+
+fn call(function: Function, arguments: &[Piece], exponent: Option<f64>, dialect: Dialect) -> Piece {
+    let row = function.row();
+    let name = match (dialect, row.ngspice) {
+        (Dialect::Bond, _) => row.name,
+        (Dialect::Ngspice, Spelling::Name(name)) => name,
+        (Dialect::Ngspice, Spelling::Expansion(template)) => {
+            return match (function, arguments) {
+                (Function::PowerOfAbs, [base, power]) => {
+                    let even = exponent.is_some_and(|y| y % 2.0 == 0.0);
+                    let base = if even { base.clone() } else { abs(base) };
+                    magnitude_power(&base, exponent, power)
+                }
+                (Function::SignedPower, [base, power]) => signed_power(base, exponent, power),
+                _ => expansion(&template(), arguments),
+            };
+        }
+    };
+    let texts: Vec<&str> = arguments.iter().map(|a| a.text.as_str()).collect();
+    Piece::atom(format!(
+        "{name}({})",
+        texts.join(if dialect == Dialect::Bond { ", " } else { "," })
+    ))
+}
+
+fn expansion(template: &Template, arguments: &[Piece]) -> Piece {
+    piece(template, Dialect::Ngspice, &mut |slot| match slot {
+        Slot::Argument(k) if *k < arguments.len() => arguments[*k].clone(),
+        _ => Piece::number(f64::NAN),
+    })
+}
+
+fn abs(a: &Piece) -> Piece {
+    Piece::atom(format!("abs({})", a.text))
+}
+
+/// |base|^y, or base^y where the base cannot be negative.
+fn magnitude_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece {
+    match exponent.and_then(|y| product_power(base, y)) {
+        Some(product) => product,
+        None => by_logarithm(&abs(base), power),
+    }
+}
+
+/// The real power, for bases of either sign.
+fn real_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece {
+    let Some(y) = exponent else {
+        // Whole exponents have a sign for negative bases; for others the power is not real anyway.
+        let (b, y) = (base.at(PRODUCT), power.at(ATOM));
+        let sign = format!("(({b} < 0) ? (1-2*({y}-2*floor({y}/2))) : (1))");
+        return Piece::new(format!("{sign}*{}", by_logarithm(&abs(base), power).text), PRODUCT);
+    };
+    if let Some(product) = product_power(base, y) {
+        return product;
+    }
+    if y != y.trunc() {
+        return by_logarithm(base, power);
+    }
+    let size = by_logarithm(&abs(base), power);
+    if y % 2.0 == 0.0 {
+        size
+    } else {
+        Piece::new(format!("sgn({})*{}", base.text, size.text), PRODUCT)
+    }
+}
+
+/// sign(base)·|base|^y
+fn signed_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece {
+    let odd = exponent.is_some_and(|y| y.abs() % 2.0 == 1.0);
+    if odd && let Some(product) = exponent.and_then(|y| product_power(base, y)) {
+        return product;
+    }
+    let size = magnitude_power(&abs(base), exponent, power);
+    Piece::new(format!("sgn({})*{}", base.text, size.at(PRODUCT + 1)), PRODUCT)
+}
+
+/// Small whole and half powers by products and a root.
+fn product_power(base: &Piece, y: f64) -> Option<Piece> {
+    let whole = y.abs().trunc();
+    let half = y.abs() - whole;
+    let factors = whole as u32;
+    if whole > f64::from(LONGEST_PRODUCT)
+        || (half != 0.0 && half != 0.5)
+        || (factors > 1 && base.text.len() * factors as usize > LONGEST_TEXT)
+    {
+        return None;
+    }
+    let mut parts = vec![base.at(ATOM); factors as usize];
+    if half == 0.5 {
+        parts.push(format!("sqrt({})", base.text));
+    }
+    let product = match parts.len() {
+        0 => Piece::number(1.0),
+        1 => Piece::new(parts.concat(), ATOM),
+        _ => Piece::new(parts.join("*"), PRODUCT),
+    };
+    Some(if y < 0.0 {
+        Piece::new(format!("1/{}", product.at(PRODUCT + 1)), PRODUCT)
+    } else {
+        product
+    })
+}
+
+fn by_logarithm(base: &Piece, power: &Piece) -> Piece {
+    Piece::atom(format!("exp({}*ln({}))", power.at(PRODUCT + 1), base.text))
+}
+
+fn interpolation(argument: &Piece, table: &Table, spice: bool) -> Piece {
+    let points = table.x.iter().zip(&table.y);
+    if !spice {
+        let rows: Vec<String> =
+            points.map(|(x, y)| format!("{}, {}", number(*x), number(*y))).collect();
+        return Piece::atom(format!("table({}, [{}])", argument.text, rows.join("; ")));
+    }
+    match (table.x.first(), table.x.last()) {
+        (Some(first), Some(last)) if first < last => {
+            let rows: Vec<String> =
+                points.map(|(x, y)| format!("{},{}", number(*x), number(*y))).collect();
+            let clamped =
+                format!("min(max({},{}),{})", argument.text, number(*first), number(*last));
+            Piece::atom(format!("pwl({clamped},{})", rows.join(",")))
+        }
+        _ => Piece::number(table.y.first().copied().unwrap_or(f64::NAN)),
+    }
+}
