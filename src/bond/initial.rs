@@ -1,4 +1,21 @@
 //! Initial values: what every storage, integrator, bond and signal is at t = 0+.
+//!
+//! Stated values stand; storages without one start at 0, or at what the others imply where the equations tie them
+//! together; `lag` without a value starts where its rate vanishes. Efforts and flows follow from the graph's own
+//! equations. Nothing is redistributed by an impulse: stated values that contradict each other are an error.
+
+use super::causality::Causality;
+use super::consistent::{self, Slot, Trouble};
+use super::equations::compiled::{Compiled, Readings, compile};
+use super::equations::{Equations, Formula, Input, Origin, Unknown, equations, unknown_name};
+use super::graph::{
+    BondGraph, Expr, Initial, Law, Leaf, Power, SignalId, SignalLaw, Storage, StoreInitial,
+    StoreLaw, VertexId,
+};
+use super::roots::roots;
+use super::structure::{Linearised, Structure, analyse};
+use crate::diagnostic::Diagnostic;
+use crate::source::Span;
 
 /// Values at t = 0+, all in SI.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,4 +37,599 @@ pub struct StorageValue {
     pub stored: f64,
     /// Its own power variable that the law gives: e of a compliance, f of an inertia, f counted into the element.
     pub power: f64,
+}
+
+/// The equations, ready to be solved.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// As they follow from the graph.
+    pub equations: Equations,
+    /// As programs, what nothing determines held at 0.
+    pub compiled: Compiled,
+    /// What they determine.
+    pub structure: Structure,
+}
+
+/// Values at t = 0+ of everything.
+pub fn solve(
+    graph: &BondGraph,
+    causality: &Causality,
+    d: &mut Vec<Diagnostic>,
+) -> Option<InitialState> {
+    let mut prepared = prepare(graph, causality, d)?;
+    let y = start(graph, &mut prepared, d)?;
+    let equations = &prepared.equations;
+    let inside = first_segment(graph, equations) * 0.5;
+    let storages = graph
+        .vertex_ids()
+        .map(|id| {
+            let (kind, bond) = match &graph.vertex(id).law {
+                Law::Store { kind, .. } | Law::Rate { kind, .. } => {
+                    (kind, graph.vertex(id).bonds.first()?)
+                }
+                _ => return None,
+            };
+            let sign =
+                if kind.gives() == Power::Flow { graph.sign_into(*bond, id, 0) } else { 1.0 };
+            Some(StorageValue {
+                stored: equations.stored(id).map_or(0.0, |k| y[k]),
+                power: sign * y[equations.power(*bond, kind.gives())],
+            })
+        })
+        .collect();
+    let signals = (0..graph.signals.len() as u32)
+        .map(|i| match equations.signal(SignalId(i)) {
+            Some(Input::Unknown(k)) => y[k as usize],
+            Some(Input::Wave(k)) => equations.waves[k as usize].value(0.0, inside),
+            _ => f64::NAN,
+        })
+        .collect();
+    Some(InitialState {
+        storages,
+        signals,
+        efforts: graph.bond_ids().map(|bond| y[equations.effort(bond)]).collect(),
+        flows: graph.bond_ids().map(|bond| y[equations.flow(bond)]).collect(),
+    })
+}
+
+/// The equations of a graph with what they determine. Errors for equations that contradict each other whatever the
+/// values; a warning for variables that nothing determines.
+pub fn prepare(
+    graph: &BondGraph,
+    causality: &Causality,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Prepared> {
+    let equations = equations(graph);
+    let mut free = compile(&equations, &[]);
+    let structure = structure(graph, &equations, &mut free, causality);
+    let names = |rows: &[usize]| elements(graph, &equations, rows);
+    let sound = structure.idle.len() == structure.undetermined.len() && structure.higher == 0;
+    if !sound
+        && structure.idle.len() > structure.undetermined.len().saturating_sub(structure.higher)
+    {
+        for (_, rows) in &structure.idle {
+            let span = spans(graph, &equations, rows).first().copied().unwrap_or(Span::NONE);
+            d.push(
+                Diagnostic::error("E0501", span, "these equations cannot all hold")
+                    .because(format!("they come from {}", names(rows)))
+                    .help("two of them set the same variable; take one away, or put an element between them"),
+            );
+        }
+        return None;
+    }
+    if structure.higher > 0 {
+        let rows: Vec<usize> = structure.constraints.iter().flat_map(|c| c.rows.clone()).collect();
+        let span = spans(graph, &equations, &rows).first().copied().unwrap_or(Span::NONE);
+        d.push(
+            Diagnostic::error("E0506", span, "a storage is tied to values whose derivatives nothing determines")
+                .because(format!("the constraint comes from {}", names(&rows)))
+                .help("let an effort or a flow act through an R, a C or an I instead of setting a stored quantity"),
+        );
+        return None;
+    }
+    let pins: Vec<(usize, usize)> = structure
+        .idle
+        .iter()
+        .map(|(row, _)| *row)
+        .zip(structure.undetermined.iter().copied())
+        .collect();
+    if !pins.is_empty() {
+        let loose: Vec<String> = (0..equations.unknowns.len())
+            .filter(|i| structure.loose[*i])
+            .map(|i| unknown_name(graph, equations.unknowns[i]))
+            .collect();
+        let rows: Vec<usize> = structure.idle.iter().flat_map(|(_, rows)| rows.clone()).collect();
+        let span = spans(graph, &equations, &rows).first().copied().unwrap_or(Span::NONE);
+        d.push(
+            Diagnostic::warning("W0510", span, format!("nothing determines {}", loose.join(", ")))
+                .because(format!("the equations of {} say something twice", names(&rows)))
+                .because("they are taken as if 0 flowed, or stood, in the ring")
+                .help("break the ring, or put an R into it"),
+        );
+    }
+    let compiled = if pins.is_empty() { free } else { compile(&equations, &pins) };
+    Some(Prepared { equations, compiled, structure })
+}
+
+/// Length of the first segment, seconds.
+fn first_segment(graph: &BondGraph, equations: &Equations) -> f64 {
+    let until = graph.experiment.until.filter(|t| *t > 0.0).unwrap_or(1.0);
+    equations.corners(until)[1]
+}
+
+/// What the equations determine, at the most favourable of some random points.
+fn structure(
+    graph: &BondGraph,
+    equations: &Equations,
+    compiled: &mut Compiled,
+    causality: &Causality,
+) -> Structure {
+    let preference = preference(graph, equations, causality);
+    let n = compiled.n;
+    let mut best: Option<(usize, Structure)> = None;
+    let mut seed = 0x2545_f491_4f6c_dd1d;
+    for size in [1.0, 1e-3, 30.0, 1e-6, 1e-9] {
+        let mut random = || size * consistent::random_sign(&mut seed);
+        let y: Vec<f64> = (0..n).map(|_| random()).collect();
+        let waves: Vec<f64> = (0..compiled.waves()).map(|_| random()).collect();
+        let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; compiled.pattern.len()]);
+        compiled.jacobian_with(size, &waves, &y, &mut f, &mut jacobian);
+        if jacobian.iter().any(|entry| !entry.is_finite()) && best.is_some() {
+            continue;
+        }
+        let mut rows = vec![vec![]; n];
+        for column in 0..n {
+            for slot in compiled.pattern.column(column) {
+                // What has no finite slope here has one elsewhere: any number stands for it.
+                let entry =
+                    if jacobian[slot].is_finite() { jacobian[slot] } else { random() / size };
+                if entry != 0.0 {
+                    rows[compiled.pattern.rows[slot] as usize].push((column, entry));
+                }
+            }
+        }
+        let algebraic = rows.split_off(compiled.states);
+        let linearised =
+            Linearised { states: compiled.states, unknowns: n, rates: rows, algebraic };
+        let structure = analyse(&linearised, &preference);
+        let defect = structure.constraints.len() + structure.idle.len() + structure.higher;
+        if defect == 0 {
+            return structure;
+        }
+        if best.as_ref().is_none_or(|(least, _)| defect < *least) {
+            best = Some((defect, structure));
+        }
+    }
+    best.map(|(_, structure)| structure).unwrap_or_default()
+}
+
+/// States from the one that most deserves to stay independent: integrators, then storages with a stated value, then
+/// the others; among these as causality assigned them, else in file order.
+fn preference(graph: &BondGraph, equations: &Equations, causality: &Causality) -> Vec<usize> {
+    let mut states: Vec<usize> = (0..equations.states).collect();
+    states.sort_by_key(|k| {
+        let vertex = match equations.unknowns[*k] {
+            Unknown::Stored(id) | Unknown::Rated(id) => id,
+            _ => return (0, 0, *k),
+        };
+        let stated = match &graph.vertex(vertex).law {
+            Law::Store { initial, .. } => !matches!(initial, StoreInitial::Unstated),
+            Law::Rate { initial, .. } => matches!(initial, Initial::Given(_)),
+            _ => false,
+        };
+        let place = causality.states.iter().position(|id| *id == vertex).unwrap_or(usize::MAX);
+        (if stated { 1 } else { 2 }, place, *k)
+    });
+    states
+}
+
+/// What is said of a state's initial value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Said {
+    /// This value, or nothing and hence 0.
+    Value { value: f64, stated: bool },
+    /// The own power variable, through a law that others modulate.
+    Power { column: usize, value: f64 },
+    /// Where its rate vanishes.
+    AtRest,
+}
+
+/// Values of all unknowns at t = 0+.
+pub fn start(
+    graph: &BondGraph,
+    prepared: &mut Prepared,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Vec<f64>> {
+    let Prepared { equations, compiled, structure } = prepared;
+    let before = d.len();
+    let mut y = vec![0.0; compiled.n];
+    let said: Vec<Said> =
+        (0..compiled.states).map(|k| say(graph, equations, k, &mut y, d)).collect();
+    if d[before..].iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
+        return None;
+    }
+    let horizon = first_segment(graph, equations);
+    let mut slots = consistent::free_dependents(compiled, structure, &y);
+    let dependent = |k: usize| structure.constraints.iter().any(|c| c.dependent == k);
+    for (k, said) in said.iter().enumerate().filter(|(k, _)| !dependent(*k)) {
+        match said {
+            Said::Value { .. } => {}
+            Said::Power { column, value } => slots[k] = Slot::fix(*column, *value),
+            Said::AtRest => slots[k] = Slot::OWN,
+        }
+    }
+    if let Err(trouble) =
+        consistent::newton_from_anywhere(compiled, &slots, 0.0, 0.5 * horizon, &mut y)
+    {
+        d.push(explain(graph, equations, compiled, &trouble, "E0504", "at t = 0"));
+        return None;
+    }
+    for constraint in &structure.constraints {
+        clash(graph, equations, constraint, &said, &y, d);
+    }
+    contradictions(graph, equations, structure, 0.5 * horizon, &y, d);
+    if d[before..].iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
+        return None;
+    }
+    if !structure.constraints.is_empty()
+        && let Err(trouble) =
+            consistent::hidden(compiled, structure, 0.0, 0.5 * horizon, horizon, &mut y)
+    {
+        d.push(explain(graph, equations, compiled, &trouble, "E0504", "just after t = 0"));
+        return None;
+    }
+    Some(y)
+}
+
+/// What is said of state `k`; puts its value and a guess of its power variable into `y`.
+fn say(
+    graph: &BondGraph,
+    equations: &Equations,
+    k: usize,
+    y: &mut [f64],
+    d: &mut Vec<Diagnostic>,
+) -> Said {
+    let number = |expr: &Expr| {
+        expr.evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => graph.parameters[id.index()].value,
+            _ => f64::NAN,
+        })
+    };
+    let initial = |initial: &Initial| match initial {
+        Initial::Given(expr) => Some(number(expr)),
+        Initial::Implied => None,
+    };
+    let said = match equations.unknowns[k] {
+        Unknown::Signal(id) => match &graph.signals[id.index()].law {
+            SignalLaw::Integrator { initial: given, .. } => match initial(given) {
+                Some(value) => Said::Value { value, stated: true },
+                None => Said::AtRest,
+            },
+            _ => Said::Value { value: 0.0, stated: false },
+        },
+        Unknown::Rated(id) => match &graph.vertex(id).law {
+            Law::Rate { initial: given, .. } => match initial(given) {
+                Some(value) => Said::Value { value, stated: true },
+                None => Said::Value { value: 0.0, stated: false },
+            },
+            _ => Said::Value { value: 0.0, stated: false },
+        },
+        Unknown::Stored(id) => match &graph.vertex(id).law {
+            Law::Store { kind, law, initial } => {
+                let said = match initial {
+                    StoreInitial::Unstated => Said::Value { value: 0.0, stated: false },
+                    StoreInitial::Stored(expr) => Said::Value { value: number(expr), stated: true },
+                    StoreInitial::Power(expr) => {
+                        let value = number(expr);
+                        match stored_of_power(graph, law, value) {
+                            Inverse::Value(value) => Said::Value { value, stated: true },
+                            Inverse::Modulated => {
+                                let (column, sign) = own(graph, equations, id, kind.gives());
+                                Said::Power { column, value: sign * value }
+                            }
+                            Inverse::Roots(found) => {
+                                d.push(no_unique_root(graph, id, *kind, value, &found));
+                                Said::Value { value: 0.0, stated: true }
+                            }
+                        }
+                    }
+                };
+                if let Said::Value { value, .. } = said
+                    && let Some(power) = power_of_stored(graph, law, value)
+                {
+                    let (column, sign) = own(graph, equations, id, kind.gives());
+                    y[column] = sign * power;
+                }
+                said
+            }
+            _ => Said::Value { value: 0.0, stated: false },
+        },
+        _ => Said::Value { value: 0.0, stated: false },
+    };
+    if let Said::Value { value, .. } = said {
+        y[k] = value;
+        if !value.is_finite() {
+            let (name, span) = named(graph, equations.state_origins[k]);
+            d.push(Diagnostic::error(
+                "E0503",
+                span,
+                format!("the initial value of {name} is not a finite number"),
+            ));
+        }
+    }
+    said
+}
+
+/// Column and sign of an element's own power variable.
+fn own(graph: &BondGraph, equations: &Equations, id: VertexId, power: Power) -> (usize, f64) {
+    match graph.vertex(id).bonds.first() {
+        Some(bond) => {
+            let sign = if power == Power::Flow { graph.sign_into(*bond, id, 0) } else { 1.0 };
+            (equations.power(*bond, power), sign)
+        }
+        None => (0, 1.0),
+    }
+}
+
+/// A stored quantity found from a power variable.
+enum Inverse {
+    Value(f64),
+    Modulated,
+    Roots(Vec<f64>),
+}
+
+/// The law's value over its own variable alone, or `None` when it speaks of anything else.
+fn own_law(graph: &BondGraph, law: &Expr) -> Option<impl Fn(f64) -> f64> {
+    let mut alone = true;
+    law.leaves(&mut |leaf, _| alone &= matches!(leaf, Leaf::Parameter(_) | Leaf::Own(_)));
+    let law = law.clone();
+    let values: Vec<f64> = graph.parameters.iter().map(|p| p.value).collect();
+    alone.then_some(move |x: f64| {
+        law.evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => values[id.index()],
+            _ => x,
+        })
+    })
+}
+
+fn stored_of_power(graph: &BondGraph, law: &StoreLaw, power: f64) -> Inverse {
+    match law {
+        StoreLaw::Linear(value) => match own_law(graph, value) {
+            Some(value) => Inverse::Value(value(0.0) * power),
+            None => Inverse::Modulated,
+        },
+        StoreLaw::OfPower(law) => match own_law(graph, law) {
+            Some(law) => Inverse::Value(law(power)),
+            None => Inverse::Modulated,
+        },
+        StoreLaw::OfStored(law) => match own_law(graph, law) {
+            Some(law) => {
+                let found = roots(&|q| law(q) - power);
+                match found[..] {
+                    [root] => Inverse::Value(root),
+                    _ => Inverse::Roots(found),
+                }
+            }
+            None => Inverse::Modulated,
+        },
+    }
+}
+
+fn power_of_stored(graph: &BondGraph, law: &StoreLaw, stored: f64) -> Option<f64> {
+    match law {
+        StoreLaw::Linear(value) => Some(stored / own_law(graph, value)?(0.0)),
+        StoreLaw::OfStored(law) => Some(own_law(graph, law)?(stored)),
+        StoreLaw::OfPower(law) => {
+            let law = own_law(graph, law)?;
+            roots(&|e| law(e) - stored).first().copied()
+        }
+    }
+    .filter(|power| power.is_finite())
+}
+
+fn no_unique_root(
+    graph: &BondGraph,
+    id: VertexId,
+    kind: Storage,
+    value: f64,
+    found: &[f64],
+) -> Diagnostic {
+    let vertex = graph.vertex(id);
+    let (power, stored) = letters(kind);
+    let message = if found.is_empty() {
+        format!("no {stored} gives {} the {power}0 = {value}", vertex.name)
+    } else {
+        format!("more than one {stored} gives {} the {power}0 = {value}", vertex.name)
+    };
+    let mut diagnostic = Diagnostic::error("E0503", vertex.span, message)
+        .help(format!("state {stored}0 instead of {power}0"));
+    if !found.is_empty() {
+        let list: Vec<String> = found.iter().take(5).map(|root| format!("{root:.6}")).collect();
+        diagnostic = diagnostic.because(format!("{stored} = {}", list.join(", ")));
+    }
+    diagnostic
+}
+
+/// (e, q) or (f, p).
+fn letters(kind: Storage) -> (&'static str, &'static str) {
+    match kind {
+        Storage::Compliance => ("e", "q"),
+        Storage::Inertia => ("f", "p"),
+    }
+}
+
+/// Compares the stated value of a dependent state with the one that the others imply.
+fn clash(
+    graph: &BondGraph,
+    equations: &Equations,
+    constraint: &super::structure::Constraint,
+    said: &[Said],
+    y: &[f64],
+    d: &mut Vec<Diagnostic>,
+) {
+    let k = constraint.dependent;
+    let (column, stated) = match said[k] {
+        Said::Value { value, stated: true } => (k, value),
+        Said::Power { column, value } => (column, value),
+        _ => return,
+    };
+    let implied = y[column];
+    if (implied - stated).abs() <= 1e-9 * implied.abs().max(stated.abs()) {
+        return;
+    }
+    let (name, span) = named(graph, equations.state_origins[k]);
+    let what = unknown_name(graph, equations.unknowns[column]);
+    let others: Vec<String> = constraint
+        .on
+        .iter()
+        .map(|on| format!("{} = {}", unknown_name(graph, equations.unknowns[*on]), y[*on]))
+        .collect();
+    let mut diagnostic = Diagnostic::error(
+        "E0502",
+        span,
+        format!("the initial values of {name} and what it depends on contradict each other"),
+    )
+    .says(format!("stated {what} = {stated}, but the others imply {implied}"));
+    for on in &constraint.on {
+        diagnostic =
+            diagnostic.label(named(graph, equations.state_origins[*on]).1, "depends on this");
+    }
+    if !others.is_empty() {
+        diagnostic = diagnostic.because(format!("at t = 0: {}", others.join(", ")));
+    }
+    d.push(
+        diagnostic
+            .because(format!(
+                "they are tied together by {}",
+                elements(graph, equations, &constraint.rows)
+            ))
+            .help("leave the value of one of them out: it then takes the implied one"),
+    );
+}
+
+/// Idle rows must say the same as the others.
+fn contradictions(
+    graph: &BondGraph,
+    equations: &Equations,
+    structure: &Structure,
+    inside: f64,
+    y: &[f64],
+    d: &mut Vec<Diagnostic>,
+) {
+    for (row, rows) in &structure.idle {
+        let formula: &Formula = &equations.algebraic[*row];
+        let mut size = 0.0f64;
+        formula.leaves(&mut |leaf, _| {
+            if let Input::Unknown(k) = leaf {
+                size = size.max(y[*k as usize].abs());
+            }
+        });
+        let value = Readings::new(equations, std::slice::from_ref(formula))
+            .read(0.0, inside, y)
+            .next()
+            .unwrap_or(0.0);
+        if value.abs() > 1e-9 * size {
+            let span = spans(graph, equations, rows).first().copied().unwrap_or(Span::NONE);
+            d.push(
+                Diagnostic::error("E0501", span, "these equations cannot all hold")
+                    .because(format!("they come from {}", elements(graph, equations, rows)))
+                    .because(format!("they are off by {value} at t = 0"))
+                    .help("two of them set the same variable; take one away, or put an element between them"),
+            );
+        }
+    }
+}
+
+/// Trouble of the solver in the words of the graph.
+pub fn explain(
+    graph: &BondGraph,
+    equations: &Equations,
+    compiled: &Compiled,
+    trouble: &Trouble,
+    code: &'static str,
+    when: &str,
+) -> Diagnostic {
+    let origin = |row: usize| {
+        if row < compiled.states {
+            equations.state_origins[row]
+        } else {
+            equations.origins[row - compiled.states]
+        }
+    };
+    match trouble {
+        Trouble::Diverged { row } => {
+            let (name, span) = named(graph, origin(*row));
+            Diagnostic::error(
+                code,
+                span,
+                format!("no efforts and flows were found that satisfy all laws {when}"),
+            )
+            .says(format!("the law of {name} is off by most"))
+            .help("check this law at the initial values: it may have no solution there, or a pole")
+        }
+        Trouble::Singular(singular) => {
+            let rows = singular.rows.first().cloned().unwrap_or_default();
+            let mut origins: Vec<Origin> = rows.iter().map(|row| origin(*row as usize)).collect();
+            origins.sort();
+            origins.dedup();
+            let names: Vec<String> =
+                origins.iter().take(12).map(|origin| named(graph, *origin).0).collect();
+            let open: Vec<String> = singular
+                .columns
+                .first()
+                .into_iter()
+                .flatten()
+                .take(6)
+                .map(|column| unknown_name(graph, equations.unknowns[*column as usize]))
+                .collect();
+            let span = origins.first().map_or(Span::NONE, |origin| named(graph, *origin).1);
+            let mut diagnostic =
+                Diagnostic::error(code, span, format!("the equations are singular {when}"));
+            if !names.is_empty() {
+                diagnostic = diagnostic
+                    .because(format!("those of {} depend on each other", names.join(", ")));
+            }
+            if !open.is_empty() {
+                diagnostic = diagnostic.because(format!("they leave {} open", open.join(", ")));
+            }
+            diagnostic.help(
+                "a law without slope, a modulus of 0 or a missing element leaves a variable open",
+            )
+        }
+    }
+}
+
+/// Name and place of where an equation comes from.
+pub fn named(graph: &BondGraph, origin: Origin) -> (String, Span) {
+    match origin {
+        Origin::Vertex(id) => {
+            let vertex = graph.vertex(id);
+            (format!("{}:{}", vertex.kind, vertex.name), vertex.span)
+        }
+        Origin::Signal(id) => {
+            let signal = &graph.signals[id.index()];
+            (format!("signal {}", signal.name), signal.span)
+        }
+    }
+}
+
+fn origins(equations: &Equations, rows: &[usize]) -> Vec<Origin> {
+    let mut origins: Vec<Origin> = rows.iter().map(|row| equations.origins[*row]).collect();
+    origins.sort();
+    origins.dedup();
+    origins
+}
+
+fn elements(graph: &BondGraph, equations: &Equations, rows: &[usize]) -> String {
+    let origins = origins(equations, rows);
+    let mut names: Vec<String> =
+        origins.iter().take(12).map(|origin| named(graph, *origin).0).collect();
+    if origins.len() > names.len() {
+        names.push("…".to_string());
+    }
+    names.join(", ")
+}
+
+fn spans(graph: &BondGraph, equations: &Equations, rows: &[usize]) -> Vec<Span> {
+    origins(equations, rows).iter().map(|origin| named(graph, *origin).1).collect()
 }

@@ -2,4 +2,10 @@
 
 pub mod graph;
 pub mod causality;
+pub mod equations;
+pub mod structure;
+pub mod roots;
+pub mod consistent;
 pub mod initial;
+#[cfg(test)]
+pub(crate) mod build;

@@ -47,6 +47,12 @@ pub const CODES: &[Code] = &[
     // -- 03: units and domains
     // -- 04: structure of the graph, causality
     // -- 05: initial values, the graph's equations
+    row("E0501", "equations cannot all hold", "Elements set the same variable to different values, so that the graph's own equations contradict each other. The message names all elements that the contradiction comes from."),
+    row("E0502", "initial values contradict each other", "Storages that depend on each other (derivative causality) must satisfy their constraint at t = 0 to 1e-9; nothing is redistributed by an impulse. The message shows the stated value and the one that the others imply. Leave one of them out: it then takes the implied one."),
+    row("E0503", "initial value cannot be used", "An effort or flow at the start is turned into a stored quantity by the element's law, which must have exactly one solution; and the value must be a finite number. State q0 or p0 instead."),
+    row("E0504", "no values satisfy all laws at the start", "The efforts and flows at t = 0 are found from the initial values of the storages. Either they leave something open (a law without slope, a modulus of 0), or no solution was found; the message names the elements."),
+    row("E0506", "a derivative is not determined", "A stored quantity is set by a signal, and the effort or flow that would move it is not free to do so. Let it act through an R, a C or an I."),
+    row("W0510", "variables that nothing determines", "The junctions leave a variable open, such as the flow round a ring of 0-junctions. It is taken as 0 and cannot be observed in earnest; break the ring, or put an R into it."),
     // -- 06: translation
     // -- 07: netlists and circuits
     row("E0750", "value is not finite", "A device's value came out infinite or as no number, mostly from a division by 0 in a parameter. The message names the device and the value."),
@@ -54,6 +60,9 @@ pub const CODES: &[Code] = &[
     row("E0752", "switch makes no sense", "A switch needs two resistances other than 0 and a hysteresis that is not negative: it closes above Vt + Vh and opens below Vt - Vh."),
     row("E0753", "diode makes no sense", "Is, N, Vj, BV, IBV and the area of a diode are above 0, M and FC from 0 to below 1."),
     // -- 08: simulation
+    row("E0850", "the second route cannot go on", "The graph's own equations, integrated without a circuit, need a step smaller than rounding allows: a law has a jump or a pole at this time, or the solution ends. The message names the variable that moves most."),
+    row("E0851", "the second route cannot go on after a corner", "After a corner of a source no efforts and flows were found that satisfy all laws."),
+    row("E0852", "the second route takes too many steps", "The run needs more steps than it is allowed; the laws or sources vary much faster than the run is long."),
     // -- 09: files and usage
     row("E0901", "no such file", "The file named does not exist. The message names the nearest one in the same folder."),
     row("E0902", "file cannot be read", "The system refused to read the file; its reason stands in the message."),

@@ -1,1 +1,323 @@
 //! The second route: the bond graph's own equations, integrated without any circuit.
+//!
+//! Only the graph, its expressions and the linear solver are shared with the first route; equations, numbering,
+//! integrator, output and energy are its own. First a coarse pilot run finds the size of every unknown; then a run whose
+//! steps are allowed the stated part of these sizes as error, for every unknown.
+
+pub mod energy;
+pub mod radau;
+#[cfg(test)]
+mod tests;
+
+use crate::bond::causality::Causality;
+use crate::bond::consistent;
+use crate::bond::equations::Unknown;
+use crate::bond::equations::compiled::Readings;
+use crate::bond::graph::BondGraph;
+use crate::bond::initial::{self, Prepared};
+use crate::diagnostic::Diagnostic;
+use energy::{Energy, Meter};
+use radau::{B, Radau, Statistics, Step, Stop};
+
+/// How to run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The error allowed to a step, in parts of the largest value of each unknown.
+    pub tolerance: f64,
+    /// Attempted steps after which a run is given up.
+    pub maximum_steps: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { tolerance: 1e-9, maximum_steps: 20_000_000 }
+    }
+}
+
+/// What a run gives.
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// Headers, one for each column: `time`, then the observed items.
+    pub names: Vec<String>,
+    /// Their values at the times asked for, in the units of the observed items; at a jump those just after it.
+    pub columns: Vec<Vec<f64>>,
+    /// The balance of energy over the run.
+    pub energy: Energy,
+    /// Of the second, fine run.
+    pub statistics: Statistics,
+    /// The corners within the run, seconds.
+    pub corners: Vec<f64>,
+}
+
+/// Integrates from 0 to the last of `times`, which ascend.
+pub fn integrate(
+    graph: &BondGraph,
+    causality: &Causality,
+    times: &[f64],
+    settings: &Settings,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
+    // What the equations lack has been said when the initial values were found.
+    let mut unheard = vec![];
+    let mut said = |found: Vec<Diagnostic>| {
+        d.extend(found.into_iter().filter(|f| f.severity == crate::diagnostic::Severity::Error));
+    };
+    let Some(mut prepared) = initial::prepare(graph, causality, &mut unheard) else {
+        said(unheard);
+        return None;
+    };
+    let formulas: Vec<_> = graph
+        .experiment
+        .observe
+        .iter()
+        .map(|item| prepared.equations.lower(graph, &item.expr, None))
+        .collect();
+    let start = initial::start(graph, &mut prepared, &mut unheard);
+    said(unheard);
+    let start = start?;
+    let factors: Vec<f64> = graph.experiment.observe.iter().map(|item| item.unit.1).collect();
+    let mut readings = Readings::new(&prepared.equations, &formulas);
+    let until = times.last().copied().unwrap_or(0.0);
+
+    let mut run = Run {
+        names: std::iter::once("time".to_string())
+            .chain(graph.experiment.observe.iter().map(|item| item.name.clone()))
+            .collect(),
+        columns: vec![Vec::with_capacity(times.len()); formulas.len() + 1],
+        corners: prepared.equations.corners(until),
+        ..Run::default()
+    };
+    let mut meter = Meter::new(graph, &prepared.equations);
+    let mut end = start.clone();
+    let mut failed = None;
+    if until > 0.0 {
+        let mut sizes = Sizes::new(graph, &prepared, &start);
+        let pilot = Settings { tolerance: 1e-4f64.max(settings.tolerance), ..*settings };
+        let mut nothing = |_: &Event| {};
+        let outcome =
+            march(&mut prepared, &run.corners, &start, &mut sizes, &pilot, true, &mut nothing);
+        if let Err(failure) = outcome {
+            failed = Some(failure);
+        } else {
+            let mut row = vec![0.0; start.len()];
+            let mut next = 0;
+            let mut observe = |event: &Event| match event {
+                Event::Step { step, from, to } => {
+                    for (stage, b) in step.stages.iter().zip(B) {
+                        row.iter_mut()
+                            .zip(step.start.iter().zip(stage))
+                            .for_each(|(r, (y, z))| *r = y + z);
+                        meter.add(b * step.h, &row);
+                    }
+                    let near = 1e-12 * until;
+                    let stop = step.t + step.h;
+                    while next < times.len()
+                        && times[next] <= stop
+                        && (times[next] < to - near || *to >= until)
+                    {
+                        step.at(times[next], &mut row);
+                        if times[next] <= step.t {
+                            row.copy_from_slice(step.start);
+                        }
+                        meter.check(&row);
+                        run.columns[0].push(times[next]);
+                        let values = readings.read(times[next], 0.5 * (from + to), &row);
+                        for ((column, value), factor) in
+                            run.columns[1..].iter_mut().zip(values).zip(&factors)
+                        {
+                            column.push(value / factor);
+                        }
+                        next += 1;
+                    }
+                }
+                Event::End(y) => end.copy_from_slice(y),
+            };
+            match march(
+                &mut prepared,
+                &run.corners,
+                &start,
+                &mut sizes,
+                settings,
+                false,
+                &mut observe,
+            ) {
+                Ok(statistics) => run.statistics = statistics,
+                Err(failure) => failed = Some(failure),
+            }
+        }
+    }
+    if let Some(failure) = failed {
+        d.push(explain(graph, &prepared, &failure));
+        return None;
+    }
+    run.energy = energy::balance(graph, &prepared.equations, &meter.work, &start, &end);
+    run.energy.junctions = meter.worst(graph);
+    Some(run)
+}
+
+/// What a run reports while it goes.
+enum Event<'a> {
+    /// An accepted step within the segment `from..to`.
+    Step { step: &'a Step<'a>, from: f64, to: f64 },
+    /// The values at the end.
+    End(&'a [f64]),
+}
+
+/// Why a run failed.
+enum Failure {
+    Stop(Stop),
+    Restart { t: f64, trouble: consistent::Trouble },
+}
+
+/// Runs through all segments.
+fn march(
+    prepared: &mut Prepared,
+    corners: &[f64],
+    start: &[f64],
+    sizes: &mut Sizes,
+    settings: &Settings,
+    pilot: bool,
+    report: &mut dyn FnMut(&Event),
+) -> Result<Statistics, Failure> {
+    let mut y = start.to_vec();
+    let mut statistics = Statistics::default();
+    let mut h = None;
+    for pair in corners.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        if from > 0.0 {
+            let inside = 0.5 * (from + to);
+            consistent::settle(
+                &mut prepared.compiled,
+                &prepared.structure,
+                from,
+                inside,
+                to - from,
+                &mut y,
+            )
+            .map_err(|trouble| Failure::Restart { t: from, trouble })?;
+            sizes.see(&y);
+        }
+        let weights = sizes.weights(settings.tolerance, pilot);
+        let mut radau = Radau::new(&mut prepared.compiled, weights);
+        radau.growing = if pilot { settings.tolerance } else { 0.0 };
+        radau.maximum_steps = settings.maximum_steps.saturating_sub(statistics.accepted);
+        let first = first_step(&mut radau, from, to, &y, h);
+        let outcome = radau.segment(from, to, &mut y, first, &mut |step| {
+            sizes.see(step.start);
+            report(&Event::Step { step, from, to });
+        });
+        statistics.add(&radau.statistics);
+        sizes.see(&y);
+        h = Some(outcome.map_err(Failure::Stop)?);
+    }
+    report(&Event::End(&y));
+    Ok(statistics)
+}
+
+/// A first step within which no state moves by more than a small part of what is allowed times a hundred.
+fn first_step(radau: &mut Radau, from: f64, to: f64, y: &[f64], last: Option<f64>) -> f64 {
+    let mut f = vec![0.0; y.len()];
+    radau.compiled.residual(from, 0.5 * (from + to), y, &mut f);
+    let fastest = (0..radau.compiled.states)
+        .map(|k| (f[k] / (100.0 * radau.weights[k])).abs())
+        .filter(|rate| rate.is_finite())
+        .fold(0.0, f64::max);
+    let careful =
+        (1e-3 * (to - from)).min(if fastest > 0.0 { 1.0 / fastest } else { f64::INFINITY });
+    careful.max(1e-9 * (to - from)).min(last.map_or(f64::INFINITY, |h| h.max(1e-9 * (to - from))))
+}
+
+/// How much more error is allowed to unknowns of index 2: their estimate carries rounding of the states divided by the
+/// step, and they do not act on the states by more than the step times their error.
+const INDEX_TWO: f64 = 100.0;
+
+/// The largest magnitude of each unknown so far, and what is not to be told from 0.
+struct Sizes {
+    largest: Vec<f64>,
+    kind: Vec<Kind>,
+    index_two: Vec<bool>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// An effort or flow, by domain.
+    Power(usize),
+    Other,
+}
+
+impl Sizes {
+    fn new(graph: &BondGraph, prepared: &Prepared, start: &[f64]) -> Sizes {
+        let kind = prepared.equations.unknowns.iter().map(|unknown| match unknown {
+            Unknown::Effort(bond) => Kind::Power(2 * graph.bond(*bond).domain as usize),
+            Unknown::Flow(bond) => Kind::Power(2 * graph.bond(*bond).domain as usize + 1),
+            _ => Kind::Other,
+        });
+        let mut sizes = Sizes {
+            largest: vec![0.0; start.len()],
+            kind: kind.collect(),
+            index_two: prepared.structure.index_two.clone(),
+        };
+        sizes.see(start);
+        sizes
+    }
+
+    fn see(&mut self, y: &[f64]) {
+        for (largest, value) in self.largest.iter_mut().zip(y) {
+            *largest = largest.max(value.abs());
+        }
+    }
+
+    /// The error allowed: the tolerance times the size, and not less than a hundred-millionth of that of the largest
+    /// unknown of the same kind, below which a value is what rounding leaves of 0.
+    fn weights(&self, tolerance: f64, pilot: bool) -> Vec<f64> {
+        let mut largest = vec![0.0f64; 2 * 16];
+        for (size, kind) in self.largest.iter().zip(&self.kind) {
+            if let Kind::Power(kind) = kind {
+                largest[*kind] = largest[*kind].max(*size);
+            }
+        }
+        let least = if pilot { 1e-6 } else { 1e-8 };
+        self.largest
+            .iter()
+            .zip(self.kind.iter().zip(&self.index_two))
+            .map(|(size, (kind, index_two))| {
+                let floor = match kind {
+                    Kind::Power(kind) => least * largest[*kind],
+                    Kind::Other => 0.0,
+                };
+                let part = if *index_two { tolerance * INDEX_TWO } else { tolerance };
+                part * size.max(floor).max(1e-15)
+            })
+            .collect()
+    }
+}
+
+fn explain(graph: &BondGraph, prepared: &Prepared, failure: &Failure) -> Diagnostic {
+    let Prepared { equations, compiled, .. } = prepared;
+    match failure {
+        Failure::Restart { t, trouble } => {
+            initial::explain(graph, equations, compiled, trouble, "E0851", &format!("at t = {t} s"))
+        }
+        Failure::Stop(Stop::TooManySteps { t }) => Diagnostic::error(
+            "E0852",
+            crate::source::Span::NONE,
+            format!("the second route took too many steps and stands at t = {t} s"),
+        ),
+        Failure::Stop(Stop::StepTooSmall { t, unknown }) => {
+            let unknown = equations.unknowns[*unknown];
+            let span = match unknown {
+                Unknown::Stored(id) | Unknown::Rated(id) => graph.vertex(id).span,
+                Unknown::Signal(id) => graph.signals[id.index()].span,
+                Unknown::Effort(id) | Unknown::Flow(id) => graph.bond(id).span,
+            };
+            let name = crate::bond::equations::unknown_name(graph, unknown);
+            Diagnostic::error(
+                "E0850",
+                span,
+                format!("the second route cannot go on past t = {t} s"),
+            )
+            .says(format!("{name} moves most"))
+            .help("a law with a jump or a pole there needs a smooth form")
+        }
+    }
+}

@@ -1,0 +1,570 @@
+//! The bond graph's own equations: an effort and a flow for each bond, straight from the definitions of the elements.
+//!
+//! ```text
+//! x' = g(x, z, t)        stored quantities, states of the rate form, integrators of signals
+//! 0  = h(x, z, t)        z: e and f of every bond along its half arrow, algebraic signals
+//! ```
+//!
+//! One row of h for each port: a junction of k bonds has k, a one-port 1, a two-port 2; so there are as many rows as
+//! efforts and flows. No causality, no elimination, no circuit: ratios and gains stand as written and never divide.
+//! Signs are those of [`graph`](super::graph).
+
+pub mod compiled;
+pub mod waveform;
+
+use super::graph::{
+    BondGraph, BondId, Dissipation, Expr, Law, Leaf, Modulus, Power, SignalId, SignalLaw, Storage,
+    StoreLaw, Variable, VertexId, Waveform,
+};
+use crate::expr::{self, Binary, Function, Node};
+pub use compiled::Compiled;
+pub use waveform::Wave;
+
+/// An unknown; states come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Unknown {
+    /// q or p of a storage.
+    Stored(VertexId),
+    /// e or f of a storage in rate form.
+    Rated(VertexId),
+    /// A signal that is an integrator, or an algebraic one.
+    Signal(SignalId),
+    /// The effort of a bond.
+    Effort(BondId),
+    /// The flow of a bond along its half arrow.
+    Flow(BondId),
+}
+
+/// Where an equation comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Origin {
+    /// The definition of a junction or an element.
+    Vertex(VertexId),
+    /// A signal's definition.
+    Signal(SignalId),
+}
+
+/// What an equation speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Input {
+    /// The unknown of an index.
+    Unknown(u32),
+    /// Time in seconds.
+    Time,
+    /// A function of time with corners, by its index in [`Equations::waves`].
+    Wave(u32),
+}
+
+/// An equation's right-hand side or residual.
+pub type Formula = expr::Expr<Input>;
+
+/// A function of time with corners.
+#[derive(Clone, Debug)]
+pub enum Known {
+    /// A waveform.
+    Wave(Wave),
+    /// Something over time alone that jumps (a comparison, a floor): held at its value inside the segment.
+    Held(Formula),
+}
+
+/// The equations of a graph.
+#[derive(Clone, Debug, Default)]
+pub struct Equations {
+    /// Unknowns, states first.
+    pub unknowns: Vec<Unknown>,
+    /// Number of states.
+    pub states: usize,
+    /// g, one for each state.
+    pub rates: Vec<Formula>,
+    /// Where each state's equation comes from.
+    pub state_origins: Vec<Origin>,
+    /// h, one for each other unknown.
+    pub algebraic: Vec<Formula>,
+    /// Where each row of h comes from.
+    pub origins: Vec<Origin>,
+    /// Functions of time.
+    pub waves: Vec<Known>,
+    /// First index of the bonds' efforts; flows alternate with them.
+    first_bond: usize,
+    /// By signal: its unknown or its wave.
+    signals: Vec<Option<Input>>,
+    /// By vertex: the unknown of its stored quantity.
+    stored: Vec<Option<u32>>,
+    /// By vertex: the unknown of its state in rate form.
+    rated: Vec<Option<u32>>,
+}
+
+/// The equations of a graph, from the definitions of its elements.
+pub fn equations(graph: &BondGraph) -> Equations {
+    let mut all = Equations {
+        signals: vec![None; graph.signals.len()],
+        stored: vec![None; graph.vertices.len()],
+        rated: vec![None; graph.vertices.len()],
+        ..Equations::default()
+    };
+    all.number(graph);
+    for id in graph.vertex_ids() {
+        all.element(graph, id);
+    }
+    for (i, signal) in graph.signals.iter().enumerate() {
+        let id = SignalId(i as u32);
+        match &signal.law {
+            SignalLaw::Algebraic(value) => {
+                let value = all.lower(graph, value, None);
+                let own = all.leaf(all.signals[i]);
+                all.row(Origin::Signal(id), own, value);
+            }
+            SignalLaw::Integrator { rate, .. } => {
+                let rate = all.lower(graph, rate, None);
+                if let Some(Input::Unknown(k)) = all.signals[i] {
+                    all.rates[k as usize] = rate;
+                }
+            }
+            SignalLaw::Waveform(_) => {}
+        }
+    }
+    all
+}
+
+impl Equations {
+    /// Index of a bond's effort.
+    pub fn effort(&self, bond: BondId) -> usize {
+        self.first_bond + 2 * bond.index()
+    }
+
+    /// Index of a bond's flow.
+    pub fn flow(&self, bond: BondId) -> usize {
+        self.effort(bond) + 1
+    }
+
+    /// Index of a bond's power variable.
+    pub fn power(&self, bond: BondId, variable: Power) -> usize {
+        match variable {
+            Power::Effort => self.effort(bond),
+            Power::Flow => self.flow(bond),
+        }
+    }
+
+    /// Index of a storage's q or p, where it is an unknown.
+    pub fn stored(&self, vertex: VertexId) -> Option<usize> {
+        self.stored[vertex.index()].map(|k| k as usize)
+    }
+
+    /// Index of the state of a storage in rate form.
+    pub fn rated(&self, vertex: VertexId) -> Option<usize> {
+        self.rated[vertex.index()].map(|k| k as usize)
+    }
+
+    /// A signal's unknown or wave.
+    pub fn signal(&self, signal: SignalId) -> Option<Input> {
+        self.signals[signal.index()]
+    }
+
+    /// Numbers the unknowns: storages, integrators, bonds, algebraic signals; waveforms are known.
+    fn number(&mut self, graph: &BondGraph) {
+        let mut read = vec![false; graph.vertices.len()];
+        every_expression(graph, &mut |expr| {
+            expr.leaves(&mut |leaf, _| {
+                if let Leaf::Stored(vertex) = leaf {
+                    read[vertex.index()] = true;
+                }
+            });
+        });
+        for id in graph.vertex_ids() {
+            let own_stored = match &graph.vertex(id).law {
+                Law::Store { .. } => true,
+                Law::Rate { .. } => {
+                    self.rated[id.index()] =
+                        Some(self.state(Unknown::Rated(id), Origin::Vertex(id)));
+                    read[id.index()]
+                }
+                _ => false,
+            };
+            if own_stored {
+                self.stored[id.index()] = Some(self.state(Unknown::Stored(id), Origin::Vertex(id)));
+            }
+        }
+        for (i, signal) in graph.signals.iter().enumerate() {
+            let id = SignalId(i as u32);
+            self.signals[i] = match &signal.law {
+                SignalLaw::Integrator { .. } => {
+                    Some(Input::Unknown(self.state(Unknown::Signal(id), Origin::Signal(id))))
+                }
+                SignalLaw::Waveform(waveform) => {
+                    self.waves.push(Known::Wave(resolve(graph, waveform)));
+                    Some(Input::Wave(self.waves.len() as u32 - 1))
+                }
+                SignalLaw::Algebraic(_) => None,
+            };
+        }
+        self.states = self.unknowns.len();
+        self.first_bond = self.states;
+        for id in graph.bond_ids() {
+            self.unknowns.extend([Unknown::Effort(id), Unknown::Flow(id)]);
+        }
+        for (i, signal) in graph.signals.iter().enumerate() {
+            if matches!(signal.law, SignalLaw::Algebraic(_)) {
+                self.signals[i] = Some(Input::Unknown(self.unknowns.len() as u32));
+                self.unknowns.push(Unknown::Signal(SignalId(i as u32)));
+            }
+        }
+    }
+
+    fn state(&mut self, unknown: Unknown, origin: Origin) -> u32 {
+        self.unknowns.push(unknown);
+        self.state_origins.push(origin);
+        self.rates.push(Formula::number(0.0));
+        self.unknowns.len() as u32 - 1
+    }
+
+    fn leaf(&self, input: Option<Input>) -> Formula {
+        input.map_or(Formula::number(0.0), Formula::leaf)
+    }
+
+    fn at(&self, index: usize) -> Formula {
+        Formula::leaf(Input::Unknown(index as u32))
+    }
+
+    /// 0 = left − right.
+    fn row(&mut self, origin: Origin, left: Formula, right: Formula) {
+        self.algebraic.push(left.binary(Binary::Subtract, right));
+        self.origins.push(origin);
+    }
+
+    /// An element's own flow at a port: counted in at port 0, out at port 1 of a two-port.
+    fn flow_at(&self, graph: &BondGraph, bond: BondId, vertex: VertexId, port: u32) -> Formula {
+        let flow = self.at(self.flow(bond));
+        let into = graph.sign_into(bond, vertex, port) > 0.0;
+        if into == (port == 0) { flow } else { flow.negate() }
+    }
+
+    /// The rows of one junction or element.
+    fn element(&mut self, graph: &BondGraph, id: VertexId) {
+        let vertex = graph.vertex(id);
+        let origin = Origin::Vertex(id);
+        let bonds = &vertex.bonds;
+        let own = |all: &Equations, variable: Power| match (bonds.first(), variable) {
+            (Some(bond), Power::Effort) => all.at(all.effort(*bond)),
+            (Some(bond), Power::Flow) => all.flow_at(graph, *bond, id, 0),
+            (None, _) => Formula::number(0.0),
+        };
+        match &vertex.law {
+            Law::Zero => self.junction(graph, id, Power::Effort),
+            Law::One => self.junction(graph, id, Power::Flow),
+            Law::Source { sets, value, .. } => {
+                let Some(bond) = bonds.first() else { return };
+                let value = self.lower(graph, value, Some(id));
+                self.row(origin, self.at(self.power(*bond, *sets)), value);
+            }
+            Law::Dissipator(Dissipation::Linear(resistance)) => {
+                let law = self
+                    .lower(graph, resistance, Some(id))
+                    .binary(Binary::Multiply, own(self, Power::Flow));
+                self.row(origin, own(self, Power::Effort), law);
+            }
+            Law::Dissipator(Dissipation::Effort(law)) => {
+                let law = self.lower(graph, law, Some(id));
+                self.row(origin, own(self, Power::Effort), law);
+            }
+            Law::Dissipator(Dissipation::Flow(law)) => {
+                let law = self.lower(graph, law, Some(id));
+                self.row(origin, own(self, Power::Flow), law);
+            }
+            Law::Store { kind, law, .. } => {
+                let Some(k) = self.stored(id) else { return };
+                self.rates[k] = own(self, kind.integrates());
+                let (stored, gives) = (self.at(k), own(self, kind.gives()));
+                match law {
+                    StoreLaw::Linear(value) => {
+                        let value = self.lower(graph, value, Some(id));
+                        self.row(origin, stored, value.binary(Binary::Multiply, gives));
+                    }
+                    StoreLaw::OfStored(law) => {
+                        let law = self.lower(graph, law, Some(id));
+                        self.row(origin, gives, law);
+                    }
+                    StoreLaw::OfPower(law) => {
+                        let law = self.lower(graph, law, Some(id));
+                        self.row(origin, stored, law);
+                    }
+                }
+            }
+            Law::Rate { kind, rate, .. } => {
+                let Some(k) = self.rated(id) else { return };
+                self.rates[k] = self.lower(graph, rate, Some(id));
+                let (state, gives) = (self.at(k), own(self, kind.gives()));
+                self.row(origin, gives, state);
+                if let Some(q) = self.stored(id) {
+                    self.rates[q] = own(self, kind.integrates());
+                }
+            }
+            Law::Transformer(modulus) | Law::Gyrator(modulus) => {
+                let [first, second] = bonds[..] else { return };
+                let (e1, e2) = (self.at(self.effort(first)), self.at(self.effort(second)));
+                let f1 = self.flow_at(graph, first, id, 0);
+                let f2 = self.flow_at(graph, second, id, 1);
+                let gyrates = matches!(vertex.law, Law::Gyrator(_));
+                let (value, rows) = match (modulus, gyrates) {
+                    (Modulus::Ratio(r), false) => (r, [(e1, e2), (f2, f1)]),
+                    (Modulus::Gain(g), false) => (g, [(e2, e1), (f1, f2)]),
+                    (Modulus::Ratio(r), true) => (r, [(e1, f2), (e2, f1)]),
+                    (Modulus::Gain(g), true) => (g, [(f1, e2), (f2, e1)]),
+                };
+                let value = self.lower(graph, value, Some(id));
+                for (left, right) in rows {
+                    self.row(origin, left, value.clone().binary(Binary::Multiply, right));
+                }
+            }
+        }
+    }
+
+    /// The common variable is equal on all bonds, the other one sums to 0, + for half arrows that point in.
+    fn junction(&mut self, graph: &BondGraph, id: VertexId, common: Power) {
+        let bonds = &graph.vertex(id).bonds;
+        let Some((first, rest)) = bonds.split_first() else { return };
+        let origin = Origin::Vertex(id);
+        for bond in rest {
+            let (left, right) =
+                (self.at(self.power(*bond, common)), self.at(self.power(*first, common)));
+            self.row(origin, left, right);
+        }
+        let mut sum = Formula::number(0.0);
+        for bond in bonds {
+            let term = self.at(self.power(*bond, common.dual()));
+            let sign =
+                if graph.sign_into(*bond, id, 0) > 0.0 { Binary::Add } else { Binary::Subtract };
+            sum = sum.binary(sign, term);
+        }
+        self.algebraic.push(sum);
+        self.origins.push(origin);
+    }
+
+    /// An expression of the graph over unknowns, time and waves; `own` is the element whose law it is.
+    pub fn lower(&mut self, graph: &BondGraph, expr: &Expr, own: Option<VertexId>) -> Formula {
+        if let Some(held) = self.held(graph, expr) {
+            return held;
+        }
+        let node = match &*expr.node {
+            Node::Leaf(leaf) => return self.lower_leaf(graph, leaf, own),
+            Node::Number(value) => Node::Number(*value),
+            Node::Unary(op, a) => Node::Unary(*op, self.lower(graph, a, own)),
+            Node::Binary(op, a, b) => {
+                Node::Binary(*op, self.lower(graph, a, own), self.lower(graph, b, own))
+            }
+            // x − y·floor(x/y), so that its jumps are found as those of the floor.
+            Node::Call(Function::Mod, arguments)
+                if over_time_alone(expr) && arguments.len() == 2 =>
+            {
+                let (x, y) = (&arguments[0], &arguments[1]);
+                let quotient = x.clone().binary(Binary::Divide, y.clone());
+                let turns =
+                    Expr::call(Function::Floor, vec![quotient]).binary(Binary::Multiply, y.clone());
+                return self.lower(graph, &x.clone().binary(Binary::Subtract, turns), own);
+            }
+            Node::Call(function, arguments) => {
+                Node::Call(*function, arguments.iter().map(|a| self.lower(graph, a, own)).collect())
+            }
+            Node::If(c, a, b) => Node::If(
+                self.lower(graph, c, own),
+                self.lower(graph, a, own),
+                self.lower(graph, b, own),
+            ),
+            Node::Table(a, table) => Node::Table(self.lower(graph, a, own), table.clone()),
+        };
+        Formula::new(node, expr.span)
+    }
+
+    fn lower_leaf(&self, graph: &BondGraph, leaf: &Leaf, own: Option<VertexId>) -> Formula {
+        let of = |vertex: VertexId, power: Power| match graph.vertex(vertex).bonds.first() {
+            Some(bond) if power == Power::Effort => self.at(self.effort(*bond)),
+            Some(bond) => self.flow_at(graph, *bond, vertex, 0),
+            None => Formula::number(f64::NAN),
+        };
+        let stored = |vertex: VertexId| {
+            self.stored(vertex).map_or(Formula::number(f64::NAN), |k| self.at(k))
+        };
+        match leaf {
+            Leaf::Parameter(id) => Formula::number(graph.parameters[id.index()].value),
+            Leaf::Signal(id) => self.leaf(self.signals[id.index()]),
+            Leaf::Time => Formula::leaf(Input::Time),
+            Leaf::Own(Variable::Power(power)) => {
+                own.map_or(Formula::number(f64::NAN), |vertex| of(vertex, *power))
+            }
+            Leaf::Own(Variable::Stored) => own.map_or(Formula::number(f64::NAN), stored),
+            Leaf::Bond { bond, variable, negated } => {
+                let value = self.at(self.power(*bond, *variable));
+                if *negated { value.negate() } else { value }
+            }
+            Leaf::Stored(vertex) => stored(*vertex),
+        }
+    }
+
+    /// Comparisons and floors over time alone jump at times that can be known beforehand.
+    fn held(&mut self, graph: &BondGraph, expr: &Expr) -> Option<Formula> {
+        let jumps = match &*expr.node {
+            Node::Binary(op, ..) => matches!(
+                op,
+                Binary::Less
+                    | Binary::LessEqual
+                    | Binary::Greater
+                    | Binary::GreaterEqual
+                    | Binary::Equal
+                    | Binary::NotEqual
+            ),
+            Node::Call(function, _) => matches!(function, Function::Floor | Function::Sign),
+            _ => false,
+        };
+        if !jumps || !over_time_alone(expr) {
+            return None;
+        }
+        let formula = expr.map(&mut |leaf, _| self.lower_leaf(graph, leaf, None));
+        self.waves.push(Known::Held(formula));
+        Some(Formula::leaf(Input::Wave(self.waves.len() as u32 - 1)))
+    }
+
+    /// Sorted times of 0, every corner and `until`.
+    pub fn corners(&self, until: f64) -> Vec<f64> {
+        let mut corners = vec![];
+        for known in &self.waves {
+            match known {
+                Known::Wave(wave) => wave.corners(until, &mut corners),
+                Known::Held(formula) => held_corners(formula, until, &mut corners),
+            }
+        }
+        waveform::merge_corners(corners, until)
+    }
+}
+
+impl Known {
+    /// The value at `t` of the piece that holds at `inside`.
+    pub fn value(&self, t: f64, inside: f64) -> f64 {
+        match self {
+            Known::Wave(wave) => wave.value(t, inside),
+            Known::Held(formula) => at_time(formula, inside),
+        }
+    }
+}
+
+fn at_time(formula: &Formula, t: f64) -> f64 {
+    formula.evaluate(&mut |_| t)
+}
+
+/// Whether the expression holds time and otherwise only parameters.
+fn over_time_alone(expr: &Expr) -> bool {
+    let (mut time, mut other) = (false, false);
+    expr.leaves(&mut |leaf, _| match leaf {
+        Leaf::Time => time = true,
+        Leaf::Parameter(_) => {}
+        _ => other = true,
+    });
+    time && !other
+}
+
+/// Times at which a held value changes: found on a grid, then by bisection to the last bit.
+fn held_corners(formula: &Formula, until: f64, corners: &mut Vec<f64>) {
+    const GRID: usize = 1 << 14;
+    let mut left = (0.0, at_time(formula, 0.0));
+    for i in 1..=GRID {
+        // Away from round fractions of the run, where the corners themselves are wont to be.
+        let t = if i == GRID { until } else { until * (i as f64 + 0.382) / GRID as f64 };
+        let value = at_time(formula, t);
+        if value != left.1 {
+            let (mut a, mut b) = (left.0, t);
+            for _ in 0..200 {
+                let middle = 0.5 * (a + b);
+                if middle <= a || middle >= b {
+                    break;
+                }
+                if at_time(formula, middle) == left.1 { a = middle } else { b = middle }
+            }
+            corners.push(b);
+        }
+        left = (t, value);
+    }
+}
+
+/// A waveform with the parameters' values.
+fn resolve(graph: &BondGraph, waveform: &Waveform) -> Wave {
+    let number = |expr: &Expr| {
+        expr.evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => graph.parameters[id.index()].value,
+            _ => f64::NAN,
+        })
+    };
+    match waveform {
+        Waveform::Step { at, before, after } => {
+            Wave::Step { at: number(at), before: number(before), after: number(after) }
+        }
+        Waveform::Ramp { at, slope } => Wave::Ramp { at: number(at), slope: number(slope) },
+        Waveform::Pulse { low, high, delay, rise, fall, width, period } => Wave::Pulse {
+            low: number(low),
+            high: number(high),
+            delay: number(delay),
+            rise: number(rise),
+            fall: number(fall),
+            width: number(width),
+            period: number(period),
+        },
+        Waveform::Sine { offset, amplitude, frequency, delay, damping, phase } => Wave::Sine {
+            offset: number(offset),
+            amplitude: number(amplitude),
+            frequency: number(frequency),
+            delay: number(delay),
+            damping: number(damping),
+            phase: number(phase),
+        },
+        Waveform::Pwl(points) => {
+            Wave::Pwl(points.iter().map(|(t, y)| (number(t), number(y))).collect())
+        }
+    }
+}
+
+/// Calls `visit` for every expression of the graph that holds during a run.
+pub fn every_expression(graph: &BondGraph, visit: &mut dyn FnMut(&Expr)) {
+    for vertex in &graph.vertices {
+        match &vertex.law {
+            Law::Zero | Law::One => {}
+            Law::Source { value, .. } => visit(value),
+            Law::Dissipator(
+                Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
+            ) => visit(law),
+            Law::Store { law, .. } => match law {
+                StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
+                    visit(law)
+                }
+            },
+            Law::Rate { rate, .. } => visit(rate),
+            Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
+                Modulus::Ratio(value) | Modulus::Gain(value) => visit(value),
+            },
+        }
+    }
+    for signal in &graph.signals {
+        match &signal.law {
+            SignalLaw::Algebraic(value) => visit(value),
+            SignalLaw::Integrator { rate, .. } => visit(rate),
+            SignalLaw::Waveform(_) => {}
+        }
+    }
+    for observation in &graph.experiment.observe {
+        visit(&observation.expr);
+    }
+}
+
+/// In the words of the graph: `q(tank)`, `e(a -> b)`, a signal's name.
+pub fn unknown_name(graph: &BondGraph, unknown: Unknown) -> String {
+    let stored = |id: VertexId| match &graph.vertex(id).law {
+        Law::Store { kind: Storage::Inertia, .. } | Law::Rate { kind: Storage::Inertia, .. } => "p",
+        _ => "q",
+    };
+    match unknown {
+        Unknown::Stored(id) => format!("{}({})", stored(id), graph.vertex(id).name),
+        Unknown::Rated(id) => {
+            let power = if stored(id) == "p" { "f" } else { "e" };
+            format!("{power}({})", graph.vertex(id).name)
+        }
+        Unknown::Signal(id) => graph.signals[id.index()].name.clone(),
+        Unknown::Effort(id) => format!("e({})", graph.bond_name(id)),
+        Unknown::Flow(id) => format!("f({})", graph.bond_name(id)),
+    }
+}
