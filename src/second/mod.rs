@@ -6,8 +6,6 @@
 
 pub mod energy;
 pub mod radau;
-#[cfg(test)]
-mod tests;
 
 use crate::bond::causality::Causality;
 use crate::bond::consistent;
@@ -321,3 +319,6 @@ fn explain(graph: &BondGraph, prepared: &Prepared, failure: &Failure) -> Diagnos
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
