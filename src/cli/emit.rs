@@ -1,14 +1,14 @@
 //! `--emit STAGE`: each noun between the text and the result, as text, so that it can be looked at.
 
 use super::table::Table;
-use crate::bond::causality::Causality;
 use crate::bond::graph::{
     self, BondGraph, Dissipation, Initial, Law, Modulus, Power, SignalLaw, Storage, StoreInitial,
-    StoreLaw, Stroke, Variable,
+    StoreLaw, Variable,
 };
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{self, Circuit, DeviceKind, Waveform};
-use crate::expr::{Binary, Expr, Node, Unary};
+use crate::expr::print::{number, print};
+use crate::expr::{Dialect, Expr};
 
 /// The stages that can be looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -25,56 +25,8 @@ pub enum Stage {
     System,
 }
 
-/// An expression in the spelling of bond graphs; brackets stand wherever operators of different kinds meet.
-pub fn expression<L>(expr: &Expr<L>, leaf: &dyn Fn(&L) -> String) -> String {
-    let inner = |e: &Expr<L>| expression(e, leaf);
-    let operand = |e: &Expr<L>| match &*e.node {
-        Node::Unary(..) | Node::Binary(..) | Node::If(..) => format!("({})", inner(e)),
-        Node::Number(value) if *value < 0.0 => format!("({})", inner(e)),
-        _ => inner(e),
-    };
-    match &*expr.node {
-        Node::Number(value) => number(*value),
-        Node::Leaf(name) => leaf(name),
-        Node::Unary(Unary::Negate, a) => format!("-{}", operand(a)),
-        Node::Unary(Unary::Not, a) => format!("not {}", operand(a)),
-        Node::Binary(op, a, b) => format!("{} {} {}", operand(a), spelled(*op), operand(b)),
-        Node::Call(function, arguments) => {
-            let arguments: Vec<String> = arguments.iter().map(inner).collect();
-            format!("{}({})", function.row().name, arguments.join(", "))
-        }
-        Node::If(c, a, b) => format!("if {} then {} else {}", operand(c), operand(a), operand(b)),
-        Node::Table(a, table) => {
-            let points = table.x.iter().zip(&table.y);
-            let points: Vec<String> =
-                points.map(|(x, y)| format!("{}, {}", number(*x), number(*y))).collect();
-            format!("table({}, [{}])", inner(a), points.join("; "))
-        }
-    }
-}
-
-fn spelled(op: Binary) -> &'static str {
-    match op {
-        Binary::Add => "+",
-        Binary::Subtract => "-",
-        Binary::Multiply => "*",
-        Binary::Divide => "/",
-        Binary::Power => "^",
-        Binary::Less => "<",
-        Binary::LessEqual => "<=",
-        Binary::Greater => ">",
-        Binary::GreaterEqual => ">=",
-        Binary::Equal => "==",
-        Binary::NotEqual => "!=",
-        Binary::And => "and",
-        Binary::Or => "or",
-    }
-}
-
-fn number(value: f64) -> String {
-    let mut text = String::new();
-    crate::trace::csv::number(value, &mut text);
-    text
+fn expression<L>(expr: &Expr<L>, leaf: &dyn Fn(&L) -> String) -> String {
+    print(expr, Dialect::Bond, &mut |name| leaf(name))
 }
 
 /// An expression of the graph, elements and signals by name.
@@ -86,8 +38,8 @@ pub fn graph_expression(graph: &BondGraph, expr: &graph::Expr) -> String {
         graph::Leaf::Own(Variable::Power(power)) => letter(*power).into(),
         graph::Leaf::Own(Variable::Stored) => "stored".into(),
         graph::Leaf::Bond { bond, variable, negated } => {
-            let sign = if *negated { "-" } else { "" };
-            format!("{sign}{}({})", letter(*variable), graph.bond_name(*bond))
+            let reading = format!("{}({})", letter(*variable), graph.bond_name(*bond));
+            if *negated { format!("(-{reading})") } else { reading }
         }
         graph::Leaf::Stored(vertex) => format!("stored({})", graph.vertex(*vertex).name),
     })
@@ -215,48 +167,6 @@ fn modulus(graph: &BondGraph, modulus: &Modulus) -> String {
         Modulus::Ratio(ratio) => format!("ratio {}", graph_expression(graph, ratio)),
         Modulus::Gain(gain) => format!("gain {}", graph_expression(graph, gain)),
     }
-}
-
-/// Strokes, states, what depends on what, algebraic loops.
-pub fn causality(graph: &BondGraph, causality: &Causality) -> String {
-    let mut text = String::new();
-    for (id, stroke) in graph.bond_ids().zip(&causality.strokes) {
-        let bond = graph.bond(id);
-        let (from, to) = (&graph.vertex(bond.from.vertex), &graph.vertex(bond.to.vertex));
-        let arrow = match stroke {
-            Some(Stroke::AtFrom) => "|->",
-            Some(Stroke::AtTo) => "->|",
-            None => "->",
-        };
-        text += &format!("{} {arrow} {}\n", from.name, to.name);
-    }
-    let names = |ids: &[graph::VertexId]| -> String {
-        let names: Vec<String> = ids
-            .iter()
-            .map(|id| format!("{}:{}", graph.vertex(*id).kind, graph.vertex(*id).name))
-            .collect();
-        names.join(", ")
-    };
-    text += &format!("\norder {}", causality.order);
-    if !causality.states.is_empty() {
-        text += &format!("; storages in integral causality: {}", names(&causality.states));
-    }
-    text.push('\n');
-    for dependent in &causality.dependent {
-        let storage = names(&[dependent.storage]);
-        let path = path(graph, &dependent.path);
-        text += &format!("{storage} depends on {} (path {path})\n", names(&dependent.on));
-    }
-    for algebraic in &causality.loops {
-        let path = path(graph, &algebraic.path);
-        text += &format!("algebraic loop of {} (path {path})\n", names(&algebraic.elements));
-    }
-    text
-}
-
-fn path(graph: &BondGraph, path: &[graph::BondId]) -> String {
-    let bonds: Vec<String> = path.iter().map(|id| graph.bond_name(*id)).collect();
-    bonds.join(", ")
 }
 
 /// The flat circuit.
@@ -419,25 +329,5 @@ fn term(factor: f64, what: &str) -> String {
         format!("-{what}")
     } else {
         format!("{}*{what}", number(factor))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::expr::Function;
-
-    #[test]
-    fn expressions_keep_their_meaning_in_brackets() {
-        let leaf = |name: &'static str| Expr::leaf(name);
-        let sum = leaf("a").binary(Binary::Add, Expr::number(-2.0));
-        let product = sum.clone().binary(Binary::Multiply, leaf("b"));
-        let power = product.clone().negate().binary(Binary::Power, Expr::number(0.5));
-        let call = Expr::call(Function::Clamp, vec![power, leaf("lo"), leaf("hi")]);
-        let spell = |e: &Expr<&'static str>| expression(e, &|name| name.to_string());
-        assert_eq!(spell(&product), "(a + (-2)) * b");
-        assert_eq!(spell(&call), "clamp((-((a + (-2)) * b)) ^ 0.5, lo, hi)");
-        let choice = Expr::choice(leaf("c"), sum, leaf("b"));
-        assert_eq!(spell(&choice), "if c then (a + (-2)) else b");
     }
 }

@@ -1,0 +1,55 @@
+//! `bondspice causality MODEL.bg`: strokes, order, states, what depends on what, algebraic loops, conflicts.
+
+use super::flags::ModelFlags;
+use super::output::write_text;
+use super::pipeline;
+use super::session::{Exit, Session};
+use crate::bond::causality;
+
+/// What it does, in a line.
+pub const ABOUT: &str = "Show causal strokes, states, dependent storages, algebraic loops, conflicts";
+
+/// An example for the help.
+pub const EXAMPLE: &str = "A stroke stands at the end that receives the effort: a ->| b means that a imposes the \
+effort on b.\n\nExample: bondspice causality model.bg --format json";
+
+/// Its flags.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The bond graph (.bg); - for standard input
+    file: String,
+    #[command(flatten)]
+    model: ModelFlags,
+    /// Form of the result
+    #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
+    format: String,
+    /// Where to write the result
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<String>,
+}
+
+/// Assigns causality and shows it, conflicts included.
+pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
+    match show(&arguments, session) {
+        Ok(exit) | Err(exit) => exit,
+    }
+}
+
+fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    let overrides = arguments.model.overrides(session)?;
+    let file = session.load(&arguments.file)?;
+    let mut d = vec![];
+    let graph = pipeline::graph(&session.map, file, &overrides, &mut d);
+    let found = graph.map(|graph| {
+        let causality = causality::analyse(&graph, &mut d);
+        (graph, causality)
+    });
+    session.say(d);
+    let Some((graph, causality)) = found else { return Err(session.exit()) };
+    let text = match arguments.format.as_str() {
+        "json" => format!("{}\n", causality::to_json(&graph, &causality)),
+        _ => causality::to_text(&graph, &causality),
+    };
+    write_text(arguments.output.as_deref(), &text, session)?;
+    Ok(session.exit())
+}

@@ -1,0 +1,78 @@
+//! `bondspice convert MODEL.bg`: the netlist, and the map of its variables.
+
+use super::emit::Stage;
+use super::flags::ModelFlags;
+use super::output::write_text;
+use super::pipeline;
+use super::session::{Exit, Session};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::write;
+use crate::source::Span;
+
+/// What it does, in a line.
+pub const ABOUT: &str = "Turn a bond graph into a netlist";
+
+/// An example for the help.
+pub const EXAMPLE: &str = "Example: bondspice convert model.bg -o model.cir --map map.json\n         \
+bondspice convert model.bg | ngspice -b";
+
+/// Simulators whose netlists are asked for and not written yet.
+const PLANNED: &[&str] = &["xyce", "ltspice", "gnucap", "saber"];
+
+/// Its flags.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The bond graph (.bg); - for standard input
+    file: String,
+    #[command(flatten)]
+    model: ModelFlags,
+    /// Where to write the netlist
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<String>,
+    /// The simulator that shall read it: ngspice
+    #[arg(long, value_name = "SIMULATOR", default_value = "ngspice")]
+    to: String,
+    /// Where to write the map: which circuit variable is which effort or flow
+    #[arg(long, value_name = "FILE")]
+    map: Option<String>,
+    /// Print a stage on the way instead of the netlist
+    #[arg(long, value_enum, value_name = "STAGE")]
+    emit: Option<Stage>,
+}
+
+/// Converts.
+pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
+    match convert(&arguments, session) {
+        Ok(()) => session.exit(),
+        Err(exit) => exit,
+    }
+}
+
+fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+    let to = arguments.to.to_lowercase();
+    if to != "ngspice" {
+        let message = if PLANNED.contains(&to.as_str()) {
+            format!("netlists for {to} cannot be written yet, only for ngspice")
+        } else {
+            format!("no simulator is called `{}`; netlists are written for ngspice", arguments.to)
+        };
+        return Err(session.fail(Diagnostic::error("E0943", Span::NONE, message)));
+    }
+    let overrides = arguments.model.overrides(session)?;
+    let file = session.load(&arguments.file)?;
+    if let Some(stage) = arguments.emit {
+        let text = pipeline::emit(session, file, &overrides, stage)?;
+        return write_text(arguments.output.as_deref(), &text, session);
+    }
+    let mut d = vec![];
+    let model = pipeline::model(&session.map, file, &overrides, &mut d);
+    session.say(d);
+    let Some(model) = model else { return Err(session.exit()) };
+    let text = write::write(&model.translation.netlist);
+    write_text(arguments.output.as_deref(), &text, session)?;
+    if let Some(name) = &arguments.map {
+        let map = serde_json::to_string_pretty(&model.translation.map.to_json());
+        write_text(Some(name), &(map.unwrap_or_default() + "\n"), session)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! Flags that several commands share: what to change in a model, and how to run it.
+
+use super::session::{Exit, Session};
+use crate::bond::elaborate::Overrides;
+use crate::diagnostic::Diagnostic;
+use crate::source::Span;
+
+/// What the command line says instead of the file.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ModelFlags {
+    /// Set a parameter, with a unit where it has one: L=2mH (repeatable)
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Drive an input: 'x_ref = step(0.1 s, 0 mm, 20 mm)' (repeatable)
+    #[arg(long, value_name = "NAME=SOURCE")]
+    pub drive: Vec<String>,
+    /// Columns of the result: 'EXPR [in UNIT] [as "NAME"], …', or all
+    #[arg(long, value_name = "LIST")]
+    pub observe: Option<String>,
+    /// Set an option of the solver: reltol=1e-8, method=trap, hmax=auto (repeatable; beats the file)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub option: Vec<String>,
+    /// End of the run: 1.5s
+    #[arg(long, value_name = "TIME")]
+    pub until: Option<String>,
+    /// Output interval: 1ms
+    #[arg(long, value_name = "TIME")]
+    pub step: Option<String>,
+}
+
+impl ModelFlags {
+    /// The flags in the words of elaboration.
+    ///
+    /// # Errors
+    /// The exit code, when what is wrong has been said.
+    pub fn overrides(&self, session: &mut Session) -> Result<Overrides, Exit> {
+        Ok(Overrides {
+            set: pairs("--set", &self.set, session)?,
+            drive: self.drive.clone(),
+            observe: self.observe.clone(),
+            until: self.until.clone(),
+            step: self.step.clone(),
+            options: pairs("--option", &self.option, session)?,
+        })
+    }
+}
+
+/// `NAME=VALUE` into its two sides.
+fn pairs(
+    flag: &str,
+    texts: &[String],
+    session: &mut Session,
+) -> Result<Vec<(String, String)>, Exit> {
+    let split = |text: &String| {
+        let (name, value) = text.split_once('=')?;
+        let (name, value) = (name.trim(), value.trim());
+        (!name.is_empty() && !value.is_empty()).then(|| (name.to_string(), value.to_string()))
+    };
+    texts
+        .iter()
+        .map(|text| {
+            split(text).ok_or_else(|| {
+                let message = format!("{flag} takes NAME=VALUE, not `{text}`");
+                session.fail(Diagnostic::error("E0940", Span::NONE, message))
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,301 @@
+//! The river as plain functions: from a text to a graph, a circuit, a run. The commands, and tests, are made of these.
+
+use super::emit::{self, Stage};
+use super::session::{Exit, Session};
+use crate::bond::causality::{self, Causality};
+use crate::bond::elaborate::{self, Overrides};
+use crate::bond::graph::BondGraph;
+use crate::bond::initial::{self, InitialState};
+use crate::bond::syntax;
+use crate::circuit::stamps::{self, Stamps};
+use crate::circuit::{Analysis, Circuit};
+use crate::diagnostic::{Diagnostic, has_errors};
+use crate::netlist::header::Header;
+use crate::netlist::{Netlist, flatten, read, write};
+use crate::sim::{self, Failure, Settings, Statistics, System};
+use crate::source::{FileId, SourceMap, Span};
+use crate::trace::{Sink, Trace};
+use crate::translate::{self, Translation};
+
+/// What a text is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// A bond graph.
+    Bond,
+    /// A netlist.
+    Netlist,
+}
+
+/// What a file is written in: the ending `.bg` says so, else, for standard input, the text.
+pub fn language(map: &SourceMap, file: FileId) -> Language {
+    let Some(file) = map.file(file) else { return Language::Netlist };
+    if file.name.ends_with(".bg") {
+        return Language::Bond;
+    }
+    if !file.name.starts_with('<') {
+        return Language::Netlist;
+    }
+    for line in file.text.lines().map(str::trim_start) {
+        let code = line.split('#').next().unwrap_or(line);
+        let mut letters = line.chars();
+        let card = letters.next() == Some('.') && letters.next().is_some_and(char::is_alphabetic);
+        if card || line.starts_with("*bondspice") {
+            return Language::Netlist;
+        }
+        let kind = code.split(':').next().unwrap_or("").trim_end();
+        let element = code.contains(':')
+            && ["Se", "Sf", "0", "1", "R", "C", "I", "TF", "GY", "MSe", "MSf"].contains(&kind);
+        if element || code.contains("->") || code.starts_with("param ") {
+            return Language::Bond;
+        }
+    }
+    Language::Netlist
+}
+
+/// The graph of a bond-graph text.
+pub fn graph(
+    map: &SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<BondGraph> {
+    let syntax = syntax::parse(map, file, d);
+    elaborate::elaborate(&syntax, map, overrides, d)
+}
+
+/// The causality of a graph.
+pub fn causality(graph: &BondGraph, d: &mut Vec<Diagnostic>) -> Option<Causality> {
+    causality::assign(graph, d)
+}
+
+/// A bond graph with all that is known before it runs.
+pub struct Model {
+    /// The graph.
+    pub graph: BondGraph,
+    /// Its causality.
+    pub causality: Causality,
+    /// What every storage and signal starts from.
+    pub initial: InitialState,
+    /// Its circuit as a netlist, with the map.
+    pub translation: Translation,
+}
+
+/// From a bond-graph text to its netlist.
+pub fn model(
+    map: &SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Model> {
+    let graph = graph(map, file, overrides, d)?;
+    let causality = causality(&graph, d)?;
+    elaborate::require_drives(&graph, d);
+    if has_errors(d) {
+        return None;
+    }
+    let initial = initial::solve(&graph, &causality, d)?;
+    let translation = translate::translate(&graph, &causality, &initial, map, d)?;
+    Some(Model { graph, causality, initial, translation })
+}
+
+/// From a text of either language to its flat circuit, and the units of its columns by name.
+pub fn circuit(
+    map: &SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<(Circuit, Units)> {
+    match language(map, file) {
+        Language::Bond => {
+            let model = model(map, file, overrides, d)?;
+            let circuit = flatten::flatten(&model.translation.netlist, d)?;
+            let items = model.graph.experiment.observe.iter();
+            let unit = |item: &crate::bond::graph::Observation| match item.unit.0.as_str() {
+                "" => item.si_unit.clone(),
+                unit => unit.to_string(),
+            };
+            Some((circuit, items.map(|item| (item.name.clone(), unit(item))).collect()))
+        }
+        Language::Netlist => {
+            let mut netlist = read::read(map, file, d);
+            if has_errors(d) {
+                return None;
+            }
+            super::deck::set_parameters(&mut netlist, &overrides.set, d);
+            super::deck::observe(&mut netlist, overrides.observe.as_deref(), d);
+            if let Some(drive) = overrides.drive.first() {
+                let message = format!("a netlist has no input to drive: `{drive}`");
+                d.push(Diagnostic::error("E0944", Span::NONE, message));
+            }
+            let units = deck_units(&netlist);
+            let mut circuit = flatten::flatten(&netlist, d)?;
+            super::deck::set_times(&mut circuit, overrides, d);
+            circuit.options.extend(overrides.options.iter().cloned());
+            (!has_errors(d)).then_some((circuit, units))
+        }
+    }
+}
+
+/// Units of columns, by their names.
+pub type Units = Vec<(String, String)>;
+
+fn deck_units(netlist: &Netlist) -> Units {
+    let (header, _) = Header::read(&netlist.header);
+    header.columns.into_iter().map(|column| (column.name, column.unit)).collect()
+}
+
+/// The unit of a column: as known, else as a node voltage or branch current has it.
+fn unit_of(name: &str, units: &Units) -> String {
+    let known = units.iter().find(|(known, _)| known == name);
+    match known {
+        Some((_, unit)) => unit.clone(),
+        None if name.starts_with("v(") => "V".into(),
+        None if name.starts_with("i(") => "A".into(),
+        None => String::new(),
+    }
+}
+
+/// A circuit that is ready to run.
+pub struct Run {
+    /// The title of the netlist.
+    pub title: String,
+    /// Headers of the columns, time first.
+    pub names: Vec<String>,
+    /// Their units.
+    pub units: Vec<String>,
+    /// What the circuit comes down to.
+    pub stamps: Stamps,
+    /// The same, ready to be solved.
+    pub system: System,
+    /// How the transient is run; `None` for an operating point.
+    pub settings: Option<Settings>,
+    /// Analyses that the text asks for.
+    pub analyses: usize,
+}
+
+/// The analyses that can be picked with `--analysis`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Pick {
+    /// `.op`
+    Op,
+    /// `.tran`
+    Tran,
+}
+
+/// From a text to a circuit ready to run. Of several analyses the last, unless one is picked.
+pub fn prepare(
+    map: &SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    pick: Option<Pick>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
+    let native = language(map, file) == Language::Bond;
+    let (circuit, units) = circuit(map, file, overrides, d)?;
+    let stamps = stamps::stamp(&circuit, d)?;
+    let point = match pick {
+        Some(pick) => pick == Pick::Op,
+        None => circuit.analyses.last() == Some(&Analysis::OperatingPoint),
+    };
+    let settings = if point { None } else { Some(Settings::of(&circuit, native, d)?) };
+    let system = sim::compile(&stamps, d)?;
+    let mut names: Vec<String> = if point { vec![] } else { vec!["time".into()] };
+    names.extend(stamps.outputs.iter().map(|(name, _)| name.clone()));
+    let unit = |name: &String| if name == "time" { "s".into() } else { unit_of(name, &units) };
+    let units = names.iter().map(unit).collect();
+    for (at, name) in names.iter().enumerate() {
+        if names[..at].contains(name) {
+            let message = format!("two columns are called `{name}`");
+            let help = "give one of them another name with `as`";
+            d.push(Diagnostic::error("E0945", Span::NONE, message).help(help));
+            return None;
+        }
+    }
+    let analyses = circuit.analyses.len();
+    Some(Run { title: circuit.title, names, units, stamps, system, settings, analyses })
+}
+
+impl Run {
+    /// Runs, and sends rows to a sink.
+    ///
+    /// # Errors
+    /// Why the run did not reach its end.
+    pub fn go(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+        match &self.settings {
+            Some(settings) => sim::transient(&self.system, settings, sink),
+            None => {
+                let point = sim::operating_point(&self.system)?;
+                super::deck::write_point(&self.system, &point, sink)
+            }
+        }
+    }
+
+    /// An empty trace with this run's columns.
+    pub fn trace(&self) -> Trace {
+        Trace::new(self.names.clone(), self.units.clone())
+    }
+}
+
+/// Runs a text from memory; its name's ending says what it is written in. For tests and small programs.
+///
+/// # Errors
+/// Everything that was said, errors and warnings.
+pub fn run_text(
+    name: &str,
+    text: &str,
+    overrides: &Overrides,
+) -> Result<(Trace, Statistics), Vec<Diagnostic>> {
+    let mut map = SourceMap::default();
+    let file = map.add(name, text);
+    let mut d = vec![];
+    let Some(run) = prepare(&map, file, overrides, None, &mut d) else { return Err(d) };
+    let mut trace = run.trace();
+    match run.go(&mut trace) {
+        Ok(statistics) => Ok((trace, statistics)),
+        Err(failure) => {
+            d.push(*failure.diagnostic);
+            Err(d)
+        }
+    }
+}
+
+/// A stage of a text as text; what is wrong has been said when there is none.
+///
+/// # Errors
+/// The exit code.
+pub fn emit(
+    session: &mut Session,
+    file: FileId,
+    overrides: &Overrides,
+    stage: Stage,
+) -> Result<String, Exit> {
+    let mut d = vec![];
+    let map = &session.map;
+    let bond = language(map, file) == Language::Bond;
+    let text = match stage {
+        Stage::Graph | Stage::Causality if !bond => {
+            let message = "a netlist has no graph and no causality";
+            d.push(Diagnostic::error("E0944", Span::NONE, message));
+            None
+        }
+        Stage::Graph => graph(map, file, overrides, &mut d).map(|graph| emit::graph(&graph)),
+        Stage::Causality => graph(map, file, overrides, &mut d).map(|graph| {
+            let causality = causality::analyse(&graph, &mut d);
+            causality::to_text(&graph, &causality)
+        }),
+        Stage::Netlist if bond => model(map, file, overrides, &mut d)
+            .map(|model| write::write(&model.translation.netlist)),
+        Stage::Netlist => Some(write::write(&read::read(map, file, &mut d))),
+        Stage::Circuit => {
+            circuit(map, file, overrides, &mut d).map(|(circuit, _)| emit::circuit(&circuit))
+        }
+        Stage::System => circuit(map, file, overrides, &mut d)
+            .and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d))
+            .map(|stamps| emit::system(&stamps)),
+    };
+    session.say(d);
+    match (text, session.exit()) {
+        (Some(text), Exit::Fine) => Ok(text),
+        (_, exit) => Err(exit),
+    }
+}

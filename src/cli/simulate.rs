@@ -1,0 +1,204 @@
+//! `bondspice simulate FILE`: runs a bond graph or a netlist.
+
+use super::emit::Stage;
+use super::flags::ModelFlags;
+use super::list;
+use super::output::{Output, write_text};
+use super::pipeline::{self, Pick, Run};
+use super::session::{Exit, Session};
+use super::watch::{self, Bar};
+use crate::bond::elaborate::Overrides;
+use crate::diagnostic::Diagnostic;
+use crate::sim::{FailureKind, Interval, Settings, Statistics};
+use crate::source::{FileId, Span};
+use crate::trace::Sink;
+use crate::trace::formats::Heading;
+use std::io;
+use std::sync::Arc;
+
+/// What it does, in a line.
+pub const ABOUT: &str = "Simulate a bond graph or a netlist";
+
+/// An example for the help.
+pub const EXAMPLE: &str = "Without -o the rows go to standard output as CSV, and on a terminal a table sums them up.\n\n\
+Example: bondspice simulate model.bg -o run.csv --set L=2mH --observe 'f(armature) in A as \"current\"'";
+
+/// Its flags.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The bond graph (.bg) or netlist; - for standard input
+    file: String,
+    #[command(flatten)]
+    model: ModelFlags,
+    /// Where to write the result: .csv, .raw or .json
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<String>,
+    /// Format of the result (csv, raw, json); else from the ending of -o
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<String>,
+    /// Head columns as `name [unit]`
+    #[arg(long)]
+    units: bool,
+    /// Rows at exactly these times, one a line, in seconds
+    #[arg(long, value_name = "FILE", conflicts_with = "step")]
+    times: Option<String>,
+    /// Which analysis of a netlist to run; without it the last
+    #[arg(long, value_enum, value_name = "KIND")]
+    analysis: Option<Pick>,
+    /// The dialect of a netlist: ngspice
+    #[arg(long, value_name = "DIALECT", default_value = "ngspice")]
+    dialect: String,
+    /// Print a stage on the way instead of running
+    #[arg(long, value_enum, value_name = "STAGE")]
+    emit: Option<Stage>,
+    /// List what can be observed, with units, instead of running
+    #[arg(long)]
+    list: bool,
+    /// Statistics of the run on stderr
+    #[arg(long, value_name = "FORM", value_parser = ["json", "text"])]
+    stats: Option<String>,
+}
+
+/// Simulates.
+pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
+    match simulate(&arguments, session) {
+        Ok(exit) | Err(exit) => exit,
+    }
+}
+
+fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    if !arguments.dialect.eq_ignore_ascii_case("ngspice") {
+        let message = format!("netlists in the dialect `{}` cannot be read yet", arguments.dialect);
+        let diagnostic = Diagnostic::error("E0943", Span::NONE, message);
+        return Err(session.fail(diagnostic.because("known: ngspice")));
+    }
+    let overrides = arguments.model.overrides(session)?;
+    let file = session.load(&arguments.file)?;
+    if let Some(stage) = arguments.emit {
+        let text = pipeline::emit(session, file, &overrides, stage)?;
+        write_text(arguments.output.as_deref(), &text, session)?;
+        return Ok(Exit::Fine);
+    }
+    if arguments.list {
+        let text = list::observables(session, file, &overrides)?;
+        write_text(arguments.output.as_deref(), &text, session)?;
+        return Ok(Exit::Fine);
+    }
+    let times = arguments.times.as_deref().map(|name| read_times(name, session)).transpose()?;
+    let mut run = prepare(arguments, file, &overrides, session)?;
+    if let (Some(times), Some(settings)) = (times, &mut run.settings) {
+        settings.rows = Interval::Times(times);
+    }
+    go(arguments, &mut run, session)
+}
+
+fn prepare(
+    arguments: &Arguments,
+    file: FileId,
+    overrides: &Overrides,
+    session: &mut Session,
+) -> Result<Run, Exit> {
+    let mut d = vec![];
+    let run = pipeline::prepare(&session.map, file, overrides, arguments.analysis, &mut d);
+    session.say(d);
+    let Some(run) = run else { return Err(session.exit()) };
+    if run.analyses > 1 && arguments.analysis.is_none() {
+        let which = if run.settings.is_some() { "tran" } else { "op" };
+        let message = format!("of {} analyses the last is run, `{which}`", run.analyses);
+        let note = Diagnostic::note("N0946", Span::NONE, message);
+        session.say([note.help("pick another with --analysis")]);
+    }
+    Ok(run)
+}
+
+fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exit, Exit> {
+    let heading = Heading { title: run.title.clone(), units: arguments.units };
+    let (to, format) = (arguments.output.as_deref(), arguments.format.as_deref());
+    let output = Output::open(to, format, heading, &run.names, &run.units, session)?;
+    let mut output = Noting { to: output, error: None };
+    let bar = Bar::new(session.global.quiet);
+    if let Some(settings) = &mut run.settings {
+        watch(settings, bar.clone());
+    }
+    let result = run.go(&mut output);
+    if let Some(bar) = bar {
+        bar.clear();
+    }
+    match result {
+        Ok(statistics) => {
+            output.to.close(true, session)?;
+            say_statistics(arguments, &statistics, session);
+            Ok(session.exit())
+        }
+        Err(failure) => {
+            let exit = match (failure.kind, output.error) {
+                (FailureKind::Output, Some(io::ErrorKind::BrokenPipe)) => return Ok(Exit::Fine),
+                (FailureKind::Interrupted, _) => Exit::Interrupted,
+                (FailureKind::Output, _) => Exit::File,
+                (FailureKind::NotSolved, _) => Exit::Simulation,
+            };
+            if failure.kind == FailureKind::Interrupted {
+                session.remark(&format!("interrupted at t = {} s", failure.time));
+            } else {
+                session.say([*failure.diagnostic]);
+            }
+            output.to.close(false, session)?;
+            say_statistics(arguments, &failure.statistics, session);
+            Err(exit)
+        }
+    }
+}
+
+fn watch(settings: &mut Settings, bar: Option<Arc<Bar>>) {
+    settings.interrupt = Some(watch::stop_flag());
+    if let Some(bar) = bar {
+        settings.progress = Some(Arc::new(move |part| bar.show(part)));
+    }
+}
+
+/// A sink that remembers why a row could not be written.
+struct Noting {
+    to: Output,
+    error: Option<io::ErrorKind>,
+}
+
+impl Sink for Noting {
+    fn row(&mut self, values: &[f64]) -> io::Result<()> {
+        self.to.row(values).inspect_err(|error| self.error = Some(error.kind()))
+    }
+}
+
+fn say_statistics(arguments: &Arguments, statistics: &Statistics, session: &Session) {
+    match arguments.stats.as_deref() {
+        // Asked for, so said even when quiet.
+        Some("json") => eprintln!("{}", statistics.to_json()),
+        Some(_) => eprintln!("{statistics}"),
+        None if session.global.verbose => eprintln!("{statistics}"),
+        None => {}
+    }
+}
+
+/// Times of rows, one a line.
+fn read_times(name: &str, session: &mut Session) -> Result<Vec<f64>, Exit> {
+    let text = session.load_text(name)?;
+    let mut times: Vec<f64> = vec![];
+    for (line, word) in text.lines().map(str::trim).enumerate().filter(|(_, w)| !w.is_empty()) {
+        let time = word.parse().ok().filter(|t: &f64| t.is_finite());
+        let after = time.filter(|t| times.last().is_none_or(|last| last < t) && *t >= 0.0);
+        match (time, after) {
+            (_, Some(time)) => times.push(time),
+            (Some(_), None) => {
+                let message = format!("`{name}`: times must rise from 0 on");
+                let note = format!("`{word}` at line {}", line + 1);
+                let diagnostic = Diagnostic::error("E0933", Span::NONE, message);
+                return Err(session.fail(diagnostic.because(note)));
+            }
+            (None, _) => {
+                let message = format!("`{name}`: `{word}` is no time in seconds");
+                let diagnostic = Diagnostic::error("E0933", Span::NONE, message);
+                return Err(session.fail(diagnostic.because(format!("at line {}", line + 1))));
+            }
+        }
+    }
+    Ok(times)
+}

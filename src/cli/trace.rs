@@ -1,0 +1,187 @@
+//! `bondspice trace RAW --map M`: another simulator's result in bond-graph names and units.
+
+use super::output::Output;
+use super::session::{Exit, Session};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Expr;
+use crate::netlist::{self, CardKind, Element, Leaf, Netlist};
+use crate::source::{SourceMap, Span};
+use crate::trace::formats::Heading;
+use crate::trace::{Sink, Trace};
+use serde::Deserialize;
+
+/// What it does, in a line.
+pub const ABOUT: &str = "Rename another simulator's result into bond-graph names and units";
+
+/// An example for the help.
+pub const EXAMPLE: &str = "Example: bondspice convert model.bg -o model.cir --map map.json\n         \
+ngspice -b -r model.raw model.cir\n         bondspice trace model.raw --map map.json -o model.csv";
+
+/// Its flags.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The result: RAW, CSV or JSON; - for standard input
+    trace: String,
+    /// The map that `bondspice convert --map` wrote; without it names stay
+    #[arg(long, value_name = "FILE")]
+    map: Option<String>,
+    /// Where to write the result
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<String>,
+    /// Format of the result (csv, raw, json); else from the ending of -o
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<String>,
+    /// Head columns as `name [unit]`
+    #[arg(long)]
+    units: bool,
+}
+
+/// The part of a map that is read here.
+#[derive(Deserialize)]
+struct Map {
+    variables: Vec<Variable>,
+}
+
+#[derive(Deserialize)]
+struct Variable {
+    bg: String,
+    expr: String,
+    #[serde(default = "one")]
+    factor: f64,
+    #[serde(default)]
+    unit: String,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Renames.
+pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
+    match rename_file(&arguments, session) {
+        Ok(()) => session.exit(),
+        Err(exit) => exit,
+    }
+}
+
+fn rename_file(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+    let mut trace = session.load_trace(&arguments.trace)?;
+    if let Some(name) = &arguments.map {
+        let text = session.load_text(name)?;
+        let map: Map = serde_json::from_str(&text).map_err(|error| {
+            let message = format!("`{name}` is no map of variables");
+            let diagnostic = Diagnostic::error("E0930", Span::NONE, message);
+            session.fail(diagnostic.because(error.to_string()))
+        })?;
+        let mut d = vec![];
+        let renamed = rename(&trace, &map, &mut d);
+        session.say(d);
+        trace = renamed.ok_or_else(|| session.exit())?;
+    }
+    let heading = Heading { title: arguments.trace.clone(), units: arguments.units };
+    let (to, format) = (arguments.output.as_deref(), arguments.format.as_deref());
+    let mut output = Output::open(to, format, heading, &trace.names, &trace.units, session)?;
+    let mut row = vec![0.0; trace.names.len()];
+    for at in 0..trace.rows() {
+        for (value, column) in row.iter_mut().zip(&trace.columns) {
+            *value = column[at];
+        }
+        let written = output.row(&row);
+        written.map_err(|error| session.unwritable(to.unwrap_or("<stdout>"), &error))?;
+    }
+    output.close(true, session)
+}
+
+/// The variables of a map over the columns of a trace. Variables that need a column which the trace lacks are left
+/// out, with a note.
+fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
+    let (netlist, places) = expressions(map);
+    let mut result = Trace::new(vec![trace.names[0].clone()], vec![trace.units[0].clone()]);
+    result.columns[0] = trace.columns[0].clone();
+    let mut lacking = vec![];
+    for (variable, place) in map.variables.iter().zip(places) {
+        let law = place.and_then(|at| match &netlist.cards[at].kind {
+            CardKind::Device(device) => match &device.element {
+                Element::BehaviouralVoltage { law } => Some(law),
+                _ => None,
+            },
+            _ => None,
+        });
+        let Some(law) = law else {
+            let message = format!("`{}` of `{}` is no expression", variable.expr, variable.bg);
+            d.push(Diagnostic::error("E0930", Span::NONE, message));
+            return None;
+        };
+        match column(trace, &netlist, law) {
+            Ok(values) => {
+                result.names.push(variable.bg.clone());
+                result.units.push(variable.unit.clone());
+                result.columns.push(values.iter().map(|v| v * variable.factor).collect());
+            }
+            Err(missing) => lacking.push((variable.bg.clone(), missing)),
+        }
+    }
+    if let Some((_, missing)) = lacking.first() {
+        let names: Vec<&str> = lacking.iter().map(|(name, _)| name.as_str()).collect();
+        let message = format!("the result lacks what {} variables of the map need", names.len());
+        let note = Diagnostic::warning("W0931", Span::NONE, message);
+        d.push(note.because(names.join(", ")).because(format!("the first needs `{missing}`")));
+    }
+    if result.names.len() == 1 {
+        let message = "no variable of the map can be told from the result";
+        let help = "is the map of the netlist that was run?";
+        d.push(Diagnostic::error("E0932", Span::NONE, message).help(help));
+        return None;
+    }
+    Some(result)
+}
+
+/// The expressions of a map as laws of a netlist, so that they are read as the netlist's own; and for each variable
+/// the card that holds it.
+fn expressions(map: &Map) -> (Netlist, Vec<Option<usize>>) {
+    let mut text = String::from("map\n");
+    for (at, variable) in map.variables.iter().enumerate() {
+        let line = variable.expr.replace(['\n', '\r'], " ");
+        text += &format!("B_{at} x_ 0 V={line}\n");
+    }
+    let mut sources = SourceMap::default();
+    let file = sources.add("<map>", text + ".end\n");
+    let netlist = netlist::read::read(&sources, file, &mut vec![]);
+    let place = |at: usize| {
+        let name = netlist.names.find(&format!("b_{at}"))?;
+        let is = |kind: &CardKind| matches!(kind, CardKind::Device(device) if device.name == name);
+        netlist.cards.iter().position(|card| is(&card.kind))
+    };
+    let places = (0..map.variables.len()).map(place).collect();
+    (netlist, places)
+}
+
+/// The values of an expression, or the first column that it lacks.
+fn column(trace: &Trace, netlist: &Netlist, law: &netlist::Expr) -> Result<Vec<f64>, String> {
+    let named = |name: &str| trace.column(name).ok_or(name.to_string());
+    let voltage = |name| match netlist.names.text(name) {
+        "0" => Ok(None),
+        node => named(&format!("v({node})")).map(Some),
+    };
+    let mut columns: Vec<[Option<&[f64]>; 2]> = vec![];
+    let indexed = law.try_map(&mut |leaf, _| {
+        columns.push(match leaf {
+            Leaf::Voltage(a, b) => [voltage(*a)?, b.map(voltage).transpose()?.flatten()],
+            Leaf::Current(device) => {
+                let name = netlist.names.text(*device).to_lowercase();
+                [Some(named(&format!("i({name})"))?), None]
+            }
+            Leaf::Parameter(name) => return Err(netlist.names.text(*name).to_string()),
+            Leaf::Time => [Some(trace.time()), None],
+        });
+        Ok(Expr::leaf(columns.len() - 1))
+    })?;
+    let at = |column: Option<&[f64]>, row: usize| column.map_or(0.0, |values| values[row]);
+    let value = |row: usize| {
+        indexed.evaluate(&mut |k: &usize| {
+            let [plus, minus] = columns[*k];
+            at(plus, row) - at(minus, row)
+        })
+    };
+    Ok((0..trace.rows()).map(value).collect())
+}
