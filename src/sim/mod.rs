@@ -1,1 +1,29 @@
-//! The simulator: Circuit → System → Trace.
+//! The simulator: Stamps → System → rows of a trace.
+//!
+//! [`compile`] once; then [`transient`] or [`operating_point`], as often as wanted. Nothing in here knows text: options
+//! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
+
+mod compile;
+mod events;
+mod explain;
+mod laws;
+pub mod methods;
+mod network;
+mod newton;
+mod op;
+mod output;
+mod settings;
+mod statistics;
+mod step;
+mod system;
+#[cfg(test)]
+mod tests;
+
+pub use crate::circuit::stamps::UnknownId;
+pub use compile::compile;
+pub use explain::{Failure, FailureKind};
+pub use methods::{METHODS, Method};
+pub use settings::{Interval, OPTIONS, OptionRow, Settings, Tolerance};
+pub use statistics::{Rejected, Statistics};
+pub use step::{OperatingPoint, operating_point, transient};
+pub use system::System;

@@ -1,0 +1,440 @@
+//! Stamps → System: affine laws become static stamps, the rest one program; patterns and places are worked out once.
+
+use super::explain;
+use super::laws::LawSet;
+use super::system::{LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
+use crate::circuit::DeviceId;
+use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
+use crate::diagnostic::Diagnostic;
+use crate::expr::{Dag, NodeId};
+use crate::linear::{Lu, Pattern};
+use crate::source::Span;
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+/// Compiles a circuit's stamps. `None` with diagnostics when no values of its parts could make it solvable: a floating
+/// node, a loop of voltage sources.
+pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
+    let mut builder = Builder::new(stamps);
+    for (k, charge) in stamps.charges.iter().enumerate() {
+        for (unknown, value) in &charge.linear {
+            builder.charge_entries.push((k as u32, unknown.0, *value));
+        }
+        for (equation, factor) in &charge.into {
+            builder.rate_entries.push((k as u32, equation.0, *factor));
+        }
+    }
+    for (k, row) in builder.rate_unknowns.clone() {
+        // The row of an added unknown: w − dQ/dt = 0.
+        builder.rate_entries.push((k, row, -1.0));
+        builder.conductances.push((row, row, 1.0));
+    }
+    builder.place_laws();
+    let system = builder.finish();
+    match check(&system) {
+        Ok(()) => Some(system),
+        Err(singular) => {
+            d.extend(explain::undetermined(&system, &singular));
+            None
+        }
+    }
+}
+
+/// A law on its way into a group.
+struct Placed {
+    node: NodeId,
+    target: Target,
+    device: DeviceId,
+}
+
+struct Builder<'a> {
+    stamps: &'a Stamps,
+    unknowns: Vec<Unknown>,
+    /// The unknown added for each charge whose rate laws speak of.
+    rate_unknowns: BTreeMap<u32, u32>,
+    conductances: Vec<(u32, u32, f64)>,
+    constants: Vec<(u32, f64)>,
+    charge_entries: Vec<(u32, u32, f64)>,
+    rate_entries: Vec<(u32, u32, f64)>,
+    curved: Vec<bool>,
+    groups: Vec<(Dag, Vec<Placed>, Option<Junction>)>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(stamps: &'a Stamps) -> Builder<'a> {
+        let mut builder = Builder {
+            stamps,
+            unknowns: stamps.unknowns.clone(),
+            rate_unknowns: BTreeMap::new(),
+            conductances: stamps.conductances.iter().map(|(r, c, v)| (r.0, c.0, *v)).collect(),
+            constants: vec![],
+            charge_entries: vec![],
+            rate_entries: vec![],
+            curved: vec![false; stamps.charges.len()],
+            groups: vec![],
+        };
+        let laws = stamps.laws.iter().map(|stamp| &stamp.law);
+        let charges = stamps.charges.iter().filter_map(|charge| charge.law.as_ref());
+        let controls = stamps.modes.iter().map(|mode| &mode.control);
+        for law in laws.chain(charges).chain(controls) {
+            law.leaves(&mut |leaf, _| {
+                if let Leaf::Rate(k) = leaf {
+                    builder.add_rate(*k);
+                }
+            });
+        }
+        builder
+    }
+
+    fn add_rate(&mut self, k: u32) {
+        if self.rate_unknowns.contains_key(&k) {
+            return;
+        }
+        let device = self.stamps.charges.get(k as usize).map(|charge| charge.device);
+        let label = device.and_then(|d| self.stamps.devices.get(d.0 as usize));
+        self.rate_unknowns.insert(k, self.unknowns.len() as u32);
+        self.unknowns.push(Unknown {
+            name: format!("d/dt({})", label.map_or("?", |label| label.name.as_str())),
+            voltage: false,
+            nominal: None,
+            device,
+            span: label.map_or(Span::NONE, |label| label.span),
+        });
+    }
+
+    /// Adds a tree with leaves numbered as [`System::inputs`] says. Rates are the added unknowns, or for output columns
+    /// inputs of their own.
+    fn add(&self, dag: &mut Dag, law: &Law, output: bool) -> NodeId {
+        let n = self.unknowns.len() as u32;
+        let modes = self.stamps.modes.len() as u32;
+        let added: Result<NodeId, Infallible> = dag.add(law, &mut |dag, leaf, _| {
+            Ok(dag.input(match leaf {
+                Leaf::Unknown(k) => k.0,
+                Leaf::Time => n,
+                Leaf::Mode(m) => n + 1 + m,
+                Leaf::Rate(k) => match self.rate_unknowns.get(k) {
+                    Some(unknown) if !output => *unknown,
+                    _ => n + 1 + modes + k,
+                },
+            }))
+        });
+        match added {
+            Ok(node) => node,
+        }
+    }
+
+    /// Affine laws go into G, C and the right-hand side; the laws of each junction's device into a group of their own,
+    /// because they are evaluated at its limited voltage; all others into one group.
+    fn place_laws(&mut self) {
+        let stamps = self.stamps;
+        let n = self.unknowns.len() as u32;
+        let mut plain: (Dag, Vec<Placed>, Option<Junction>) = (Dag::default(), vec![], None);
+        let mut junctions: BTreeMap<u32, (Dag, Vec<Placed>, Option<Junction>)> = BTreeMap::new();
+        for stamp in &stamps.laws {
+            if let Some(junction) = stamp.junction {
+                junctions
+                    .entry(stamp.device.0)
+                    .or_insert_with(|| (Dag::default(), vec![], Some(junction)));
+            }
+        }
+        for stamp in &stamps.laws {
+            let into: Vec<(u32, f64)> = stamp.into.iter().map(|(row, f)| (row.0, *f)).collect();
+            let group = junctions.get_mut(&stamp.device.0).unwrap_or(&mut plain);
+            let node = self.add(&mut group.0, &stamp.law, false);
+            match group.0.affine(node) {
+                Some((constant, factors)) if factors.iter().all(|(input, _)| *input < n) => {
+                    for (row, factor) in into {
+                        if constant != 0.0 {
+                            self.constants.push((row, -factor * constant));
+                        }
+                        for (input, slope) in &factors {
+                            self.conductances.push((row, *input, factor * slope));
+                        }
+                    }
+                }
+                _ => group.1.push(Placed {
+                    node,
+                    target: Target::Equations(into),
+                    device: stamp.device,
+                }),
+            }
+        }
+        for (k, charge) in stamps.charges.iter().enumerate() {
+            let Some(law) = &charge.law else { continue };
+            let group = junctions.get_mut(&charge.device.0).unwrap_or(&mut plain);
+            let node = self.add(&mut group.0, law, false);
+            match group.0.affine(node) {
+                // A constant part of a charge has no rate, but it belongs to the initial value: keep such a law.
+                Some((constant, factors))
+                    if constant == 0.0 && factors.iter().all(|(input, _)| *input < n) =>
+                {
+                    for (input, slope) in factors {
+                        self.charge_entries.push((k as u32, input, slope));
+                    }
+                }
+                _ => {
+                    self.curved[k] = true;
+                    let target = Target::Charge(k as u32);
+                    group.1.push(Placed { node, target, device: charge.device });
+                }
+            }
+        }
+        self.groups.push(plain);
+        self.groups.extend(junctions.into_values());
+        self.groups.retain(|(_, laws, _)| !laws.is_empty());
+    }
+
+    fn finish(mut self) -> System {
+        let stamps = self.stamps;
+        let n = self.unknowns.len();
+        let charges = stamps.charges.len();
+        let mut groups: Vec<LawGroup> = vec![];
+        for (mut dag, laws, junction) in std::mem::take(&mut self.groups) {
+            let nodes: Vec<NodeId> = laws.iter().map(|law| law.node).collect();
+            groups.push(LawGroup {
+                laws: LawSet::new(&mut dag, &nodes, n as u32 + 1),
+                devices: laws.iter().map(|law| law.device).collect(),
+                targets: laws.into_iter().map(|law| law.target).collect(),
+                dynamic: vec![],
+                dynamic_charge: vec![],
+                frozen: vec![],
+                frozen_charge: vec![],
+                by_time: vec![],
+                charge_slopes: vec![],
+                junction,
+            });
+        }
+        let conductances = Rows::new(n, self.conductances.clone());
+        let charge_rows = Rows::new(charges, self.charge_entries.clone());
+        let rates = Rows::new(charges, self.rate_entries.clone());
+        let dynamic = plan_dynamic(n, &conductances, &charge_rows, &rates, &mut groups);
+        let (frozen, node_slots, free_slots) =
+            plan_frozen(n, stamps.nodes, &conductances, &charge_rows, &rates, &mut groups);
+
+        let mut dag = Dag::default();
+        let controls: Vec<NodeId> =
+            stamps.modes.iter().map(|mode| self.add(&mut dag, &mode.control, false)).collect();
+        let controls = LawSet::without_derivatives(&dag, &controls);
+        let mut dag = Dag::default();
+        let all: Vec<(String, Law)>;
+        let columns = if stamps.outputs.is_empty() {
+            let leaf = |k: usize| Law::leaf(Leaf::Unknown(super::UnknownId(k as u32)));
+            let named = stamps.unknowns.iter().enumerate();
+            all = named.map(|(k, unknown)| (unknown.name.clone(), leaf(k))).collect();
+            &all
+        } else {
+            &stamps.outputs
+        };
+        let mut output_rates = false;
+        for (_, law) in columns {
+            law.leaves(&mut |leaf, _| output_rates |= matches!(leaf, Leaf::Rate(_)));
+        }
+        let nodes: Vec<NodeId> =
+            columns.iter().map(|(_, law)| self.add(&mut dag, law, true)).collect();
+        let output_laws = LawSet::without_derivatives(&dag, &nodes);
+        System {
+            nodes: stamps.nodes,
+            outputs: columns.iter().map(|(name, _)| name.clone()).collect(),
+            devices: stamps.devices.clone(),
+            charge_devices: stamps.charges.iter().map(|charge| charge.device).collect(),
+            conductances,
+            constants: self.constants,
+            charges: charge_rows,
+            rates,
+            initial_charges: stamps.charges.iter().map(|charge| charge.initial).collect(),
+            initial: stamps.initial.iter().map(|(node, value)| (node.0, *value)).collect(),
+            curved: self.curved,
+            groups,
+            sources: stamps
+                .sources
+                .iter()
+                .map(|source| Source {
+                    waveform: source.waveform.clone(),
+                    into: source.into.iter().map(|(row, factor)| (row.0, *factor)).collect(),
+                })
+                .collect(),
+            modes: stamps
+                .modes
+                .iter()
+                .map(|mode| ModeData {
+                    device: mode.device,
+                    on: mode.on,
+                    off: mode.off,
+                    initial: mode.initial,
+                })
+                .collect(),
+            controls,
+            output_laws,
+            output_rates,
+            dynamic,
+            frozen,
+            node_slots,
+            free_slots,
+            unknowns: self.unknowns,
+        }
+    }
+}
+
+/// Places of a matrix while its pattern is collected.
+#[derive(Default)]
+struct Plan {
+    triplets: Vec<(u32, u32)>,
+}
+
+impl Plan {
+    /// Asks for a place; its number stands for the slot until the pattern is known.
+    fn ask(&mut self, row: usize, column: usize) -> u32 {
+        self.triplets.push((row as u32, column as u32));
+        self.triplets.len() as u32 - 1
+    }
+}
+
+/// W(α) = G + f' + α·A·(C + q').
+fn plan_dynamic(
+    n: usize,
+    conductances: &Rows,
+    charges: &Rows,
+    rates: &Rows,
+    groups: &mut [LawGroup],
+) -> MatrixPlan {
+    let mut plan = Plan::default();
+    let mut fixed: Vec<(u32, f64)> = vec![];
+    for (row, column, value) in conductances.triplets() {
+        fixed.push((plan.ask(row, column), value));
+    }
+    let mut storage: Vec<Place> = vec![];
+    for (k, equation, sign) in rates.triplets() {
+        for (column, value) in charges.row(k) {
+            let slot = plan.ask(equation, column);
+            storage.push(Place { partial: k as u32, slot, factor: sign * value });
+        }
+    }
+    for group in groups.iter_mut() {
+        let LawGroup { laws, targets, dynamic, dynamic_charge, by_time, charge_slopes, .. } = group;
+        for (o, target) in targets.iter().enumerate() {
+            for p in laws.row(o) {
+                let (input, partial) = (laws.input(p), p as u32);
+                match target {
+                    Target::Equations(into) => {
+                        for (row, factor) in into {
+                            if input == n {
+                                by_time.push((partial, *row, *factor));
+                            } else {
+                                let slot = plan.ask(*row as usize, input);
+                                dynamic.push(Place { partial, slot, factor: *factor });
+                            }
+                        }
+                    }
+                    Target::Charge(k) if input < n => {
+                        charge_slopes.push((partial, *k, input as u32));
+                        for (row, factor) in rates.row(*k as usize) {
+                            let slot = plan.ask(row, input);
+                            dynamic_charge.push(Place { partial, slot, factor });
+                        }
+                    }
+                    Target::Charge(_) => {}
+                }
+            }
+        }
+    }
+    let (pattern, slots) = Pattern::from_triplets(n, &plan.triplets);
+    let settle = |place: &mut Place| place.slot = slots[place.slot as usize];
+    for group in groups {
+        group.dynamic.iter_mut().for_each(settle);
+        group.dynamic_charge.iter_mut().for_each(settle);
+    }
+    storage.iter_mut().for_each(settle);
+    let fixed = settled(&pattern, &slots, &fixed);
+    MatrixPlan { pattern, fixed, storage }
+}
+
+/// The frozen network, with the slots of the nodes' diagonal entries and of each charge's own w.
+fn plan_frozen(
+    n: usize,
+    nodes: usize,
+    conductances: &Rows,
+    charges: &Rows,
+    rates: &Rows,
+    groups: &mut [LawGroup],
+) -> (MatrixPlan, Vec<u32>, Vec<u32>) {
+    let mut plan = Plan::default();
+    let mut fixed: Vec<(u32, f64)> = vec![];
+    for (row, column, value) in conductances.triplets() {
+        fixed.push((plan.ask(row, column), value));
+    }
+    for (k, equation, sign) in rates.triplets() {
+        fixed.push((plan.ask(equation, n + k), sign));
+    }
+    let mut storage: Vec<Place> = vec![];
+    for (k, column, value) in charges.triplets() {
+        let slot = plan.ask(n + k, column);
+        storage.push(Place { partial: k as u32, slot, factor: value });
+    }
+    for group in groups.iter_mut() {
+        let LawGroup { laws, targets, frozen, frozen_charge, .. } = group;
+        for (o, target) in targets.iter().enumerate() {
+            for p in laws.row(o) {
+                let (input, partial) = (laws.input(p), p as u32);
+                match target {
+                    _ if input >= n => {}
+                    Target::Equations(into) => {
+                        for (row, factor) in into {
+                            let slot = plan.ask(*row as usize, input);
+                            frozen.push(Place { partial, slot, factor: *factor });
+                        }
+                    }
+                    Target::Charge(k) => {
+                        let slot = plan.ask(n + *k as usize, input);
+                        frozen_charge.push((*k, Place { partial, slot, factor: 1.0 }));
+                    }
+                }
+            }
+        }
+    }
+    let node_slots: Vec<u32> = (0..nodes).map(|node| plan.ask(node, node)).collect();
+    let count = charges.starts.len() - 1;
+    let free_slots: Vec<u32> = (0..count).map(|k| plan.ask(n + k, n + k)).collect();
+    let (pattern, slots) = Pattern::from_triplets(n + count, &plan.triplets);
+    let settle = |place: &mut Place| place.slot = slots[place.slot as usize];
+    for group in groups {
+        group.frozen.iter_mut().for_each(settle);
+        group.frozen_charge.iter_mut().for_each(|(_, place)| settle(place));
+    }
+    storage.iter_mut().for_each(settle);
+    let fixed = settled(&pattern, &slots, &fixed);
+    let settle_all = |asked: Vec<u32>| asked.iter().map(|a| slots[*a as usize]).collect();
+    (MatrixPlan { pattern, fixed, storage }, settle_all(node_slots), settle_all(free_slots))
+}
+
+fn settled(pattern: &Pattern, slots: &[u32], fixed: &[(u32, f64)]) -> Vec<f64> {
+    let mut values = vec![0.0; pattern.len()];
+    for (asked, value) in fixed {
+        values[slots[*asked as usize] as usize] += value;
+    }
+    values
+}
+
+/// Whether W(α) can be solved with for some slopes of the laws. Slopes are drawn at random, so that a slope that
+/// happens to vanish somewhere is not taken for a fault of the circuit.
+fn check(system: &System) -> Result<(), crate::linear::Singular> {
+    const ALPHA: f64 = 1e6;
+    let plan = &system.dynamic;
+    let mut values = plan.fixed.clone();
+    for place in &plan.storage {
+        values[place.slot as usize] += ALPHA * place.factor;
+    }
+    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut draw = || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        0.5 + (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    for group in &system.groups {
+        let slopes: Vec<f64> = (0..group.laws.partials()).map(|_| draw()).collect();
+        for place in group.dynamic.iter().chain(&group.dynamic_charge) {
+            values[place.slot as usize] += place.factor * slopes[place.partial as usize];
+        }
+    }
+    Lu::factor(&plan.pattern, &values).map(|_| ())
+}

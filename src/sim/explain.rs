@@ -1,0 +1,248 @@
+//! Why a run failed, in terms of equations, devices and nodes.
+
+use super::newton::Cut;
+use super::op::Trouble;
+use super::statistics::Statistics;
+use super::system::System;
+use crate::circuit::DeviceId;
+use crate::diagnostic::Diagnostic;
+use crate::linear::Singular;
+use crate::source::Span;
+use std::fmt;
+
+/// What kind of failure it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureKind {
+    /// The equations could not be solved: exit code 4.
+    NotSolved,
+    /// The run was interrupted: exit code 130.
+    Interrupted,
+    /// Rows could not be written: exit code 5.
+    Output,
+}
+
+/// A run that did not reach its end.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// What kind it is.
+    pub kind: FailureKind,
+    /// What happened, with places.
+    pub diagnostic: Box<Diagnostic>,
+    /// When, s.
+    pub time: f64,
+    /// What was done until then.
+    pub statistics: Box<Statistics>,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.diagnostic.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Where in a run a solution was not found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Moment {
+    OperatingPoint,
+    Start,
+    Restart,
+    Step,
+}
+
+impl Moment {
+    fn text(self) -> &'static str {
+        match self {
+            Moment::OperatingPoint => "no operating point was found",
+            Moment::Start => "no consistent values were found at the start",
+            Moment::Restart => "no consistent values were found after a corner or event",
+            Moment::Step => "the step became too small",
+        }
+    }
+}
+
+/// The diagnostic for what could not be solved. `span` is the length of the run, for saying how small a step is.
+pub(crate) fn failure(
+    system: &System,
+    moment: Moment,
+    time: f64,
+    trouble: &Trouble,
+    statistics: &Statistics,
+) -> Failure {
+    let code = match (trouble, moment) {
+        (Trouble::Modes(_), _) => "E0804",
+        (Trouble::Cut(Cut::NonFinite { .. }), _) => "E0803",
+        (Trouble::Cut(Cut::Singular(_)), _) => "E0805",
+        (_, Moment::Step) => "E0802",
+        _ => "E0801",
+    };
+    let message = format!("{} at t = {time:.6e} s", moment.text());
+    let mut diagnostic = match trouble {
+        Trouble::Modes(device) => {
+            let name = system.device_name(*device);
+            Diagnostic::error(code, system.device_span(*device), message)
+                .says(format!("`{name}` switches to and fro without end"))
+                .because(
+                    "no combination of the switches' states agrees with the voltages that it leads to",
+                )
+                .help("give the switch some hysteresis, or a capacitance at the node that controls it")
+        }
+        Trouble::Cut(Cut::NonFinite { device }) => match device {
+            Some(device) => {
+                let name = system.device_name(*device);
+                Diagnostic::error(code, system.device_span(*device), message)
+                    .says(format!("the law of `{name}` or its slope is infinite or no number"))
+                    .help("look for a division by 0, or a root or logarithm of a negative value")
+            }
+            None => Diagnostic::error(code, Span::NONE, message)
+                .because("a value grew beyond all bounds"),
+        },
+        Trouble::Cut(Cut::Singular(singular)) => {
+            let mut all = undetermined(system, singular);
+            if all.is_empty() {
+                Diagnostic::error(code, Span::NONE, message).because("the matrix is singular")
+            } else {
+                let mut first = all.swap_remove(0);
+                first.code = code;
+                first.notes.insert(0, std::mem::replace(&mut first.message, message));
+                first
+            }
+        }
+        Trouble::Cut(Cut::NoConvergence { worst }) => {
+            let (what, span) = equation(system, *worst);
+            Diagnostic::error(code, span, message).says(format!("{what} is satisfied worst")).help(
+                match moment {
+                    Moment::OperatingPoint => {
+                        "check the values near there; or give initial values and start with `uic`"
+                    }
+                    _ => {
+                        "check the values near there; a smaller `hmax` or another `method` may help"
+                    }
+                },
+            )
+        }
+    };
+    let r = &statistics.rejected;
+    let causes: Vec<String> = [
+        (r.error, "by local error"),
+        (r.newton, "without convergence"),
+        (r.singular, "with a singular matrix"),
+        (r.non_finite, "with a value that is no number"),
+    ]
+    .iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, cause)| format!("{count} {cause}"))
+    .collect();
+    if !causes.is_empty() {
+        diagnostic.notes.push(format!(
+            "{} steps were accepted; steps cut: {}",
+            statistics.accepted,
+            causes.join(", ")
+        ));
+    }
+    Failure {
+        kind: FailureKind::NotSolved,
+        diagnostic: Box::new(diagnostic),
+        time,
+        statistics: Box::new(statistics.clone()),
+    }
+}
+
+/// What an equation says, and where it stands.
+pub(crate) fn equation(system: &System, row: usize) -> (String, Span) {
+    match system.unknowns.get(row) {
+        Some(unknown) if row < system.nodes => {
+            (format!("the sum of currents at the node of {}", unknown.name), unknown.span)
+        }
+        Some(unknown) => match unknown.device {
+            Some(device) => {
+                (format!("the law of `{}`", system.device_name(device)), system.device_span(device))
+            }
+            None => (format!("the equation of {}", unknown.name), unknown.span),
+        },
+        None => match system.charge_devices.get(row - system.equations()) {
+            Some(device) => (
+                format!("the charge of `{}`", system.device_name(*device)),
+                system.device_span(*device),
+            ),
+            None => ("an equation".into(), Span::NONE),
+        },
+    }
+}
+
+/// One diagnostic for each set of unknowns that nothing determines.
+pub(crate) fn undetermined(system: &System, singular: &Singular) -> Vec<Diagnostic> {
+    let n = system.equations();
+    let mut result: Vec<Diagnostic> = vec![];
+    for set in singular.columns.iter().take(8) {
+        let unknowns: Vec<usize> = set.iter().map(|k| *k as usize).filter(|k| *k < n).collect();
+        let nodes: Vec<usize> = unknowns.iter().copied().filter(|k| *k < system.nodes).collect();
+        let branches: Vec<DeviceId> = unknowns
+            .iter()
+            .filter(|k| **k >= system.nodes)
+            .filter_map(|k| system.unknowns[*k].device)
+            .collect();
+        // Currents alone can circulate without changing a voltage only in a loop of voltage sources; where a voltage
+        // is undetermined too, the currents hang on it.
+        result.push(if nodes.is_empty() && !branches.is_empty() {
+            loop_of_sources(system, &branches)
+        } else {
+            floating_nodes(system, &nodes)
+        });
+    }
+    if result.is_empty() {
+        let rows = singular.rows.iter().flatten().map(|row| *row as usize);
+        if let Some(row) = rows.into_iter().find(|row| *row < n) {
+            let (what, span) = equation(system, row);
+            result.push(
+                Diagnostic::error("E0780", span, "the circuit has no single solution")
+                    .says(format!("{what} contradicts the others, or repeats them")),
+            );
+        }
+    }
+    result
+}
+
+fn loop_of_sources(system: &System, branches: &[DeviceId]) -> Diagnostic {
+    let names = listed(branches.iter().map(|device| system.device_name(*device)));
+    let message = match branches {
+        [_] => format!("`{names}` is a voltage source across nothing but itself"),
+        _ => format!("{names} form a loop of voltage sources"),
+    };
+    let mut diagnostic = Diagnostic::error("E0781", Span::NONE, message);
+    for device in branches.iter().take(6) {
+        let text =
+            format!("the current through `{}` is not determined", system.device_name(*device));
+        diagnostic = diagnostic.label(system.device_span(*device), text);
+    }
+    diagnostic
+        .because("any current could flow round the loop; inductors count as sources of 0 V at rest")
+        .help("put a resistance into the loop, or take one of the sources out")
+}
+
+fn floating_nodes(system: &System, nodes: &[usize]) -> Diagnostic {
+    let names = listed(nodes.iter().map(|node| system.unknowns[*node].name.as_str()));
+    let message = match nodes {
+        [] => "the circuit has no single solution".to_string(),
+        [_] => format!("{names} is not determined: the node floats"),
+        _ => format!("{names} are not determined: the nodes float together"),
+    };
+    let mut diagnostic = Diagnostic::error("E0780", Span::NONE, message);
+    for node in nodes.iter().take(6) {
+        let unknown = &system.unknowns[*node];
+        diagnostic =
+            diagnostic.label(unknown.span, format!("{} could have any value", unknown.name));
+    }
+    diagnostic
+        .because("only current sources, or nothing at all, join them to the rest of the circuit")
+        .help("join them to ground by a resistor, or name one of them 0")
+}
+
+fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let all: Vec<&str> = names.collect();
+    match all.len() {
+        0..=6 => all.join(", "),
+        more => format!("{}, … ({more} in all)", all[..5].join(", ")),
+    }
+}

@@ -1,0 +1,98 @@
+//! A set of laws as two programs: values alone, and values with all partial derivatives.
+
+use crate::expr::{Dag, NodeId, Program};
+
+/// Laws over common inputs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LawSet {
+    values: Program,
+    full: Program,
+    /// The partial derivatives of law `o` are `starts[o]..starts[o + 1]`.
+    starts: Vec<u32>,
+    /// What each is taken by.
+    inputs: Vec<u32>,
+}
+
+/// Room for the two programs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Registers {
+    values: Vec<f64>,
+    full: Vec<f64>,
+}
+
+impl LawSet {
+    /// Compiles values and derivatives by the inputs below `inputs`.
+    pub fn new(dag: &mut Dag, laws: &[NodeId], inputs: u32) -> LawSet {
+        let mut outputs = laws.to_vec();
+        let mut set = LawSet { starts: vec![0], ..LawSet::default() };
+        for law in laws {
+            for (input, derivative) in dag.partials(*law) {
+                if input < inputs {
+                    set.inputs.push(input);
+                    outputs.push(derivative);
+                }
+            }
+            set.starts.push(set.inputs.len() as u32);
+        }
+        set.values = Program::compile(dag, laws);
+        set.full = Program::compile(dag, &outputs);
+        set
+    }
+
+    /// Compiles values only.
+    pub fn without_derivatives(dag: &Dag, laws: &[NodeId]) -> LawSet {
+        LawSet {
+            values: Program::compile(dag, laws),
+            starts: vec![0; laws.len() + 1],
+            ..LawSet::default()
+        }
+    }
+
+    /// Room to run in.
+    pub fn registers(&self) -> Registers {
+        Registers { values: self.values.registers(), full: self.full.registers() }
+    }
+
+    /// Number of partial derivatives.
+    pub fn partials(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// The partial derivatives of a law.
+    pub fn row(&self, law: usize) -> std::ops::Range<usize> {
+        self.starts[law] as usize..self.starts[law + 1] as usize
+    }
+
+    /// What a partial derivative is taken by.
+    pub fn input(&self, partial: usize) -> usize {
+        self.inputs[partial] as usize
+    }
+
+    /// Number of instructions, without and with derivatives.
+    pub fn instructions(&self) -> (usize, usize) {
+        (self.values.instructions(), self.full.instructions())
+    }
+
+    /// Values of all laws.
+    pub fn values(&self, inputs: &[f64], registers: &mut Registers, out: &mut [f64]) {
+        self.values.run(inputs, &mut registers.values);
+        for (out, value) in out.iter_mut().zip(self.values.outputs(&registers.values)) {
+            *out = value;
+        }
+    }
+
+    /// Values and partial derivatives of all laws.
+    pub fn full(
+        &self,
+        inputs: &[f64],
+        registers: &mut Registers,
+        out: &mut [f64],
+        partials: &mut [f64],
+    ) {
+        self.full.run(inputs, &mut registers.full);
+        let all = out.iter_mut().chain(partials);
+        for (out, value) in all.zip(self.full.outputs(&registers.full)) {
+            *out = value;
+        }
+    }
+}

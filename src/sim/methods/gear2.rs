@@ -1,0 +1,48 @@
+//! Gear's method of order 2 (BDF2) on charges and fluxes, with variable steps.
+//!
+//! ```text
+//! h·Q'₁ = (1 + 2ω)/(1 + ω)·Q₁ − (1 + ω)·Q₀ + ω²/(1 + ω)·Q₋₁,    ω = h/h₋₁
+//! δQ    = h³/6·(1 + ω)²/(ω·(1 + 2ω))·Q'''
+//! ```
+//!
+//! Steps grow by less than 1 + √2, within which the method is stable. After a corner one TR-BDF2 step is taken.
+//! Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.5.
+
+use super::trapezoidal::second_difference;
+use super::{Work, filtered_error, trbdf2, weighted};
+use crate::sim::network::Network;
+use crate::sim::newton::{Cut, Stage, solve_stage};
+use crate::sim::op::State;
+
+pub(crate) fn step(
+    network: &mut Network,
+    from: &State,
+    to: &mut State,
+    weights: &[f64],
+    work: &mut Work,
+) -> Result<f64, Cut> {
+    let Some(before) = work.before else {
+        return trbdf2::step(network, from, to, weights, work);
+    };
+    let h = to.t - from.t;
+    let last = from.t - before;
+    let ratio = h / last;
+    let alpha = (1.0 + 2.0 * ratio) / (1.0 + ratio) / h;
+    let Work { beta, sum, error, dense, scratch, q_before, w_before, .. } = work;
+    to.x.copy_from_slice(&from.x);
+    network.remember_junctions(&from.x);
+    for (k, beta) in beta.iter_mut().enumerate() {
+        *beta = (ratio * ratio / (1.0 + ratio) * q_before[k] - (1.0 + ratio) * from.q[k]) / h;
+    }
+    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION };
+    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
+    let constant = (1.0 + ratio) * (1.0 + ratio) / (ratio * (1.0 + 2.0 * ratio));
+    for k in 0..to.q.len() {
+        to.w[k] = alpha * to.q[k] + beta[k];
+        let third = 2.0 * second_difference(h, last, w_before[k], from.w[k], to.w[k]);
+        sum[k] = h * h * h / 6.0 * constant * third;
+    }
+    filtered_error(network, alpha, sum, error);
+    dense.hermite(from, to);
+    Ok(weighted(error, weights))
+}

@@ -1,0 +1,253 @@
+//! Integration methods: each takes one step of a given size and estimates its local error.
+
+pub mod gear2;
+pub mod rodas;
+pub mod trapezoidal;
+pub mod trbdf2;
+
+use super::network::Network;
+use super::newton::{Cut, Scratch};
+use super::op::State;
+
+/// An integration method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Chosen by the circuit.
+    Auto,
+    /// Rosenbrock, order 4.
+    Rodas4,
+    /// Rosenbrock, order 5.
+    Rodas5p,
+    /// Trapezoidal rule and BDF2 in one step, order 2, L-stable.
+    TrBdf2,
+    /// Trapezoidal rule, order 2.
+    Trapezoidal,
+    /// BDF2 with variable steps, order 2.
+    Gear2,
+}
+
+/// One row of [`METHODS`].
+#[derive(Clone, Copy, Debug)]
+pub struct MethodRow {
+    /// As `method=` names it.
+    pub name: &'static str,
+    /// Other names of it.
+    pub aliases: &'static [&'static str],
+    /// Which it is.
+    pub method: Method,
+    /// Order of its error over a run; 0 where that depends.
+    pub order: u32,
+    /// Where it comes from.
+    pub source: &'static str,
+}
+
+/// Every method, one row each.
+#[rustfmt::skip]
+pub const METHODS: &[MethodRow] = &[
+    MethodRow { name: "auto", aliases: &[], method: Method::Auto, order: 0, source: "chosen by the circuit" },
+    MethodRow { name: "rodas5p", aliases: &["rodas5"], method: Method::Rodas5p, order: 5, source: "G. Steinebach, BIT 63:27, 2023" },
+    MethodRow { name: "rodas4", aliases: &["rodas4p", "rodas"], method: Method::Rodas4, order: 4, source: "G. Steinebach, Preprint 1741, TH Darmstadt, 1995" },
+    MethodRow { name: "trbdf2", aliases: &[], method: Method::TrBdf2, order: 2, source: "M. E. Hosea, L. F. Shampine, Appl. Numer. Math. 20:21-37, 1996" },
+    MethodRow { name: "trap", aliases: &["trapezoidal"], method: Method::Trapezoidal, order: 2, source: "L. W. Nagel, SPICE2, ERL-M520, 1975" },
+    MethodRow { name: "gear", aliases: &["gear2", "bdf2"], method: Method::Gear2, order: 2, source: "E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, 1993, III.5" },
+];
+
+impl Method {
+    /// By a name of the table, in any case.
+    pub fn named(name: &str) -> Option<Method> {
+        let matches = |n: &str| n.eq_ignore_ascii_case(name);
+        let mut rows = METHODS.iter();
+        rows.find(|row| matches(row.name) || row.aliases.iter().any(|a| matches(a)))
+            .map(|row| row.method)
+    }
+
+    /// The name in the table.
+    pub fn name(self) -> &'static str {
+        METHODS.iter().find(|row| row.method == self).map_or("auto", |row| row.name)
+    }
+
+    /// The power of the step size that the error estimate of one step grows with.
+    pub(crate) fn error_power(self) -> f64 {
+        match self {
+            Method::Rodas5p => 5.0,
+            Method::Rodas4 => 4.0,
+            _ => 3.0,
+        }
+    }
+}
+
+/// The method that suits a circuit, and why.
+pub(crate) fn choose(network: &Network, index2: bool) -> (Method, &'static str) {
+    if index2 {
+        (Method::TrBdf2, "loops of capacitors and sources, or cutsets of inductors: index 2")
+    } else if network.system.has_junctions() {
+        (Method::TrBdf2, "exponential junctions")
+    } else {
+        (Method::Rodas5p, "smooth equations of index 1")
+    }
+}
+
+/// Values between the ends of a step, for charges and unknowns alike:
+/// y(θ) = (1 − θ)·y₀ + θ·(y₁ + (1 − θ)·(k₁ + θ·(k₂ + θ·k₃)))
+#[derive(Clone, Debug)]
+pub(crate) struct Dense {
+    /// k₁, k₂, k₃ of the unknowns.
+    pub x: [Vec<f64>; 3],
+    /// k₁, k₂, k₃ of the charges.
+    pub q: [Vec<f64>; 3],
+}
+
+impl Dense {
+    fn new(n: usize, charges: usize) -> Dense {
+        Dense {
+            x: std::array::from_fn(|_| vec![0.0; n]),
+            q: std::array::from_fn(|_| vec![0.0; charges]),
+        }
+    }
+
+    /// Cubic polynomials of the charges through their values and rates at both ends; straight lines of the unknowns.
+    pub fn hermite(&mut self, from: &State, to: &State) {
+        let h = to.t - from.t;
+        for k in 0..from.q.len() {
+            let change = to.q[k] - from.q[k];
+            self.q[0][k] = h * from.w[k] - change;
+            self.q[1][k] = 2.0 * change - h * (from.w[k] + to.w[k]);
+            self.q[2][k] = 0.0;
+        }
+        self.x.iter_mut().for_each(|k| k.fill(0.0));
+    }
+
+    /// The unknowns at a part of the step.
+    pub fn unknowns(&self, theta: f64, from: &State, to: &State, out: &mut [f64]) {
+        interpolate(theta, &from.x, &to.x, &self.x, out);
+    }
+
+    /// The charges at a part of the step.
+    pub fn charges(&self, theta: f64, from: &State, to: &State, out: &mut [f64]) {
+        interpolate(theta, &from.q, &to.q, &self.q, out);
+    }
+}
+
+fn interpolate(theta: f64, from: &[f64], to: &[f64], k: &[Vec<f64>; 3], out: &mut [f64]) {
+    let rest = 1.0 - theta;
+    for (i, out) in out.iter_mut().enumerate() {
+        let inner = k[0][i] + theta * (k[1][i] + theta * k[2][i]);
+        *out = rest * from[i] + theta * (to[i] + rest * inner);
+    }
+}
+
+/// What a step may use of the past, and room to work in.
+#[derive(Debug)]
+pub(crate) struct Work {
+    /// Increments of the stages, one vector after another.
+    pub ux: Vec<f64>,
+    pub uq: Vec<f64>,
+    pub x: Vec<f64>,
+    pub q: Vec<f64>,
+    pub w: Vec<f64>,
+    pub beta: Vec<f64>,
+    pub sum: Vec<f64>,
+    pub right: Vec<f64>,
+    pub slopes: Vec<f64>,
+    /// The local error of each unknown.
+    pub error: Vec<f64>,
+    pub dense: Dense,
+    pub scratch: Scratch,
+    /// The time before the last, for methods of several steps; `None` after a restart.
+    pub before: Option<f64>,
+    pub q_before: Vec<f64>,
+    pub w_before: Vec<f64>,
+    /// Whether the laws' derivatives are those at the left end of the step.
+    pub linearised: bool,
+}
+
+impl Work {
+    pub fn new(n: usize, charges: usize) -> Work {
+        Work {
+            ux: vec![0.0; 8 * n],
+            uq: vec![0.0; 8 * charges],
+            x: vec![0.0; n],
+            q: vec![0.0; charges],
+            w: vec![0.0; charges],
+            beta: vec![0.0; charges],
+            sum: vec![0.0; charges],
+            right: vec![0.0; n],
+            slopes: vec![0.0; n],
+            error: vec![0.0; n],
+            dense: Dense::new(n, charges),
+            scratch: Scratch::new(n, charges),
+            before: None,
+            q_before: vec![0.0; charges],
+            w_before: vec![0.0; charges],
+            linearised: false,
+        }
+    }
+
+    /// Keeps the left end of an accepted step for methods of several steps.
+    pub fn remember(&mut self, from: &State) {
+        self.before = Some(from.t);
+        self.q_before.copy_from_slice(&from.q);
+        self.w_before.copy_from_slice(&from.w);
+    }
+}
+
+/// One step of a method from `from` to `to.t`; `weights` are those of the error test. Gives the largest weighted error.
+pub(crate) fn step(
+    method: Method,
+    network: &mut Network,
+    from: &State,
+    to: &mut State,
+    weights: &[f64],
+    work: &mut Work,
+) -> Result<f64, Cut> {
+    match method {
+        Method::Rodas4 => rodas::step(&rodas::RODAS4P, network, from, to, weights, work),
+        Method::Rodas5p => rodas::step(&rodas::RODAS5P, network, from, to, weights, work),
+        Method::Trapezoidal => trapezoidal::step(network, from, to, weights, work),
+        Method::Gear2 => gear2::step(network, from, to, weights, work),
+        Method::TrBdf2 | Method::Auto => trbdf2::step(network, from, to, weights, work),
+    }
+}
+
+/// Largest |error|/weight; a number that is none counts as infinite.
+pub(crate) fn weighted(error: &[f64], weights: &[f64]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for (error, weight) in error.iter().zip(weights) {
+        let size = error.abs() / weight;
+        if size.is_nan() {
+            return f64::INFINITY;
+        }
+        largest = largest.max(size);
+    }
+    largest
+}
+
+/// The error of the unknowns that errors of the charges cause: W(α)⁻¹·A·α·δQ, with the factors at hand.
+pub(crate) fn filtered_error(
+    network: &mut Network,
+    alpha: f64,
+    charges: &[f64],
+    error: &mut [f64],
+) {
+    error.fill(0.0);
+    network.system.rates.add_transposed(alpha, charges, error);
+    network.solve_dynamic(error);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_has_a_row_and_names_are_found() {
+        for row in METHODS {
+            assert_eq!(Method::named(row.name), Some(row.method));
+            assert_eq!(row.method.name(), row.name);
+            for alias in row.aliases {
+                assert_eq!(Method::named(alias), Some(row.method));
+            }
+        }
+        assert_eq!(Method::named("TRAP"), Some(Method::Trapezoidal));
+        assert_eq!(Method::named("euler"), None);
+    }
+}

@@ -1,0 +1,72 @@
+//! TR-BDF2: the trapezoidal rule to t + γh, then BDF2 over the whole step. One matrix, L-stable, order 2.
+//!
+//! ```text
+//! γ = 2 − √2, d = γ/2, w = √2/4
+//! Q(γ) = Q₀ + h·d·(Q'₀ + Q'(γ))
+//! Q₁   = Q₀ + h·(w·Q'₀ + w·Q'(γ) + d·Q'₁)
+//! δQ   = h·((1 − 4w)/3·Q'₀ + 1/3·Q'(γ) − 2d/3·Q'₁)
+//! ```
+//!
+//! Rates are kept for each charge, and algebraic equations hold at each stage, so that nothing rings.
+//! Source: M. E. Hosea, L. F. Shampine, Analysis and implementation of TR-BDF2, Appl. Numer. Math. 20:21-37, 1996.
+
+use super::{Work, filtered_error, weighted};
+use crate::sim::network::Network;
+use crate::sim::newton::{Cut, Stage, solve_stage};
+use crate::sim::op::State;
+use std::f64::consts::SQRT_2;
+
+/// Error of iteration against the tolerance of the step.
+pub(crate) const ITERATION: f64 = 0.02;
+
+pub(crate) fn step(
+    network: &mut Network,
+    from: &State,
+    to: &mut State,
+    weights: &[f64],
+    work: &mut Work,
+) -> Result<f64, Cut> {
+    const GAMMA: f64 = 2.0 - SQRT_2;
+    const D: f64 = GAMMA / 2.0;
+    const W: f64 = SQRT_2 / 4.0;
+    let h = to.t - from.t;
+    let alpha = 1.0 / (D * h);
+    let Work { x, q, w, beta, sum, error, dense, scratch, .. } = work;
+
+    x.copy_from_slice(&from.x);
+    network.remember_junctions(x);
+    for (k, beta) in beta.iter_mut().enumerate() {
+        *beta = -alpha * from.q[k] - from.w[k];
+    }
+    let middle = from.t + GAMMA * h;
+    let stage = Stage { t: middle, alpha, beta, weights, tolerance: ITERATION };
+    solve_stage(network, &stage, x, q, scratch)?;
+    for (k, w) in w.iter_mut().enumerate() {
+        *w = alpha * q[k] + beta[k];
+    }
+
+    for (to, (from, middle)) in to.x.iter_mut().zip(from.x.iter().zip(x.iter())) {
+        *to = from + (middle - from) / GAMMA;
+    }
+    for (k, beta) in beta.iter_mut().enumerate() {
+        *beta = -alpha * (from.q[k] + h * W * (from.w[k] + w[k]));
+    }
+    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: ITERATION };
+    network.remember_junctions(x);
+    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
+    for (k, rate) in to.w.iter_mut().enumerate() {
+        *rate = alpha * to.q[k] + beta[k];
+    }
+
+    for (k, sum) in sum.iter_mut().enumerate() {
+        *sum = h * ((1.0 - 4.0 * W) / 3.0 * from.w[k] + w[k] / 3.0 - 2.0 * D / 3.0 * to.w[k]);
+    }
+    filtered_error(network, alpha, sum, error);
+    dense.hermite(from, to);
+    // The unknowns between: a parabola through the middle stage.
+    for (i, k) in dense.x[0].iter_mut().enumerate() {
+        let line = (1.0 - GAMMA) * from.x[i] + GAMMA * to.x[i];
+        *k = (x[i] - line) / (GAMMA * (1.0 - GAMMA));
+    }
+    Ok(weighted(error, weights))
+}

@@ -1,0 +1,478 @@
+//! A system at a point: values of laws and charges, residuals, and the two matrices filled and factorised.
+//!
+//! All buffers are made once; nothing here allocates while a run steps.
+
+use super::laws::Registers;
+use super::statistics::Statistics;
+use super::system::{LawGroup, MatrixPlan, System, Target};
+use crate::circuit::waveform::Segment;
+use crate::linear::{Lu, Singular};
+
+/// The conductance that pins a node to its `.ic` value, as in SPICE.
+const PIN: f64 = 1e10;
+
+/// A matrix of fixed pattern with its factors.
+#[derive(Debug)]
+pub(crate) struct Matrix {
+    pub values: Vec<f64>,
+    lu: Option<Lu<f64>>,
+    work: Vec<f64>,
+}
+
+impl Matrix {
+    fn new(plan: &MatrixPlan) -> Matrix {
+        Matrix { values: vec![0.0; plan.pattern.len()], lu: None, work: vec![0.0; plan.pattern.n] }
+    }
+
+    /// Replays the chosen pivots; chooses new ones where the guard objects.
+    fn factorise(
+        &mut self,
+        plan: &MatrixPlan,
+        statistics: &mut Statistics,
+    ) -> Result<(), Singular> {
+        if let Some(lu) = &mut self.lu {
+            statistics.refactorisations += 1;
+            if lu.refactor(&self.values).is_ok() {
+                return Ok(());
+            }
+        }
+        statistics.factorisations += 1;
+        match Lu::factor(&plan.pattern, &self.values) {
+            Ok(lu) => {
+                self.lu = Some(lu);
+                Ok(())
+            }
+            Err(singular) => {
+                self.lu = None;
+                Err(singular)
+            }
+        }
+    }
+
+    /// Solves in place.
+    fn solve(&mut self, statistics: &mut Statistics, vector: &mut [f64]) {
+        statistics.solves += 1;
+        if let Some(lu) = &self.lu {
+            lu.solve(vector, &mut self.work);
+        }
+    }
+}
+
+/// Values of one group of laws.
+#[derive(Debug)]
+struct GroupState {
+    values: Vec<f64>,
+    partials: Vec<f64>,
+    registers: Registers,
+    /// Junction voltage of the last linearisation.
+    voltage: f64,
+}
+
+/// A system with modes, segments of its sources, and room to compute in.
+#[derive(Debug)]
+pub(crate) struct Network<'a> {
+    pub system: &'a System,
+    /// The segment that each source is on.
+    pub segments: Vec<Segment>,
+    /// Each mode, 0 or 1.
+    pub modes: Vec<f64>,
+    /// How far past its threshold each mode's control may be by the tolerance of event location.
+    pub mode_room: Vec<f64>,
+    /// A conductance from every node to ground, while an operating point is sought; otherwise 0.
+    pub gmin: f64,
+    /// Factor of all sources, while an operating point is sought; otherwise 1.
+    pub drive: f64,
+    /// Pins the nodes of `.ic` to their values, while an operating point is sought.
+    pub pin_initial: bool,
+    pub statistics: Statistics,
+    inputs: Vec<f64>,
+    control_registers: Registers,
+    output_registers: Registers,
+    groups: Vec<GroupState>,
+    dynamic: Matrix,
+    frozen: Matrix,
+    /// α of the factorised dynamic matrix, where it depends on nothing else.
+    factored_alpha: Option<f64>,
+}
+
+impl<'a> Network<'a> {
+    /// At time `t`, all modes 0.
+    pub fn new(system: &'a System, t: f64) -> Network<'a> {
+        let groups = system
+            .groups
+            .iter()
+            .map(|group| GroupState {
+                values: vec![0.0; group.targets.len()],
+                partials: vec![0.0; group.laws.partials()],
+                registers: group.laws.registers(),
+                voltage: 0.0,
+            })
+            .collect();
+        Network {
+            system,
+            segments: system.sources.iter().map(|s| s.waveform.segment(t)).collect(),
+            modes: vec![0.0; system.modes.len()],
+            mode_room: vec![0.0; system.modes.len()],
+            gmin: 0.0,
+            drive: 1.0,
+            pin_initial: false,
+            statistics: Statistics::default(),
+            inputs: vec![0.0; system.inputs()],
+            control_registers: system.controls.registers(),
+            output_registers: system.output_laws.registers(),
+            groups,
+            dynamic: Matrix::new(&system.dynamic),
+            frozen: Matrix::new(&system.frozen),
+            factored_alpha: None,
+        }
+    }
+
+    /// The next corner of any source; infinite when there is none.
+    pub fn next_corner(&self) -> f64 {
+        self.segments.iter().fold(f64::INFINITY, |first, segment| first.min(segment.end))
+    }
+
+    /// Moves each source whose segment ends at or just before `t` to its next one.
+    pub fn pass_corner(&mut self, t: f64, slack: f64) {
+        for (segment, source) in self.segments.iter_mut().zip(&self.system.sources) {
+            while segment.end <= t + slack {
+                *segment = source.waveform.segment(segment.end);
+            }
+        }
+    }
+
+    fn set_inputs(&mut self, x: &[f64], t: f64) {
+        let n = x.len();
+        self.inputs[..n].copy_from_slice(x);
+        self.inputs[n] = t;
+        self.inputs[n + 1..n + 1 + self.modes.len()].copy_from_slice(&self.modes);
+    }
+
+    /// Values of all laws at a point.
+    pub fn evaluate(&mut self, x: &[f64], t: f64) {
+        if self.groups.is_empty() {
+            return;
+        }
+        self.statistics.evaluations += 1;
+        self.set_inputs(x, t);
+        for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
+            group.laws.values(&self.inputs, &mut state.registers, &mut state.values);
+        }
+    }
+
+    /// Values and derivatives at a point. With `limit`, junction voltages move from those of the last call by no more
+    /// than an exponential bears, and the laws are extended linearly from there; says whether any was limited.
+    pub fn linearise(&mut self, x: &[f64], t: f64, limit: bool) -> bool {
+        if self.groups.is_empty() {
+            return false;
+        }
+        self.statistics.evaluations += 1;
+        self.statistics.jacobians += 1;
+        self.set_inputs(x, t);
+        let mut limited = false;
+        for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
+            let laws = &group.laws;
+            let Some(junction) = &group.junction else {
+                laws.full(
+                    &self.inputs,
+                    &mut state.registers,
+                    &mut state.values,
+                    &mut state.partials,
+                );
+                continue;
+            };
+            let at = |unknown: Option<crate::circuit::stamps::UnknownId>| {
+                unknown.map_or(0.0, |k| x[k.0 as usize])
+            };
+            let voltage = at(junction.across[0]) - at(junction.across[1]);
+            let allowed = if limit {
+                limit_junction(voltage, state.voltage, junction.thermal, junction.critical)
+            } else {
+                voltage
+            };
+            state.voltage = allowed;
+            let moved = allowed - voltage;
+            let (input, change) = match junction.across {
+                [Some(anode), _] => (anode.0 as usize, moved),
+                [None, Some(cathode)] => (cathode.0 as usize, -moved),
+                [None, None] => (0, 0.0),
+            };
+            let kept = self.inputs[input];
+            self.inputs[input] = kept + change;
+            laws.full(&self.inputs, &mut state.registers, &mut state.values, &mut state.partials);
+            self.inputs[input] = kept;
+            if change != 0.0 {
+                limited = true;
+                for (o, value) in state.values.iter_mut().enumerate() {
+                    for p in laws.row(o) {
+                        if laws.input(p) == input {
+                            *value -= state.partials[p] * change;
+                        }
+                    }
+                }
+            }
+        }
+        limited
+    }
+
+    /// Lets the next limiting start from the junction voltages at `x`.
+    pub fn remember_junctions(&mut self, x: &[f64]) {
+        for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
+            if let Some(junction) = &group.junction {
+                let [anode, cathode] = junction.across.map(|u| u.map_or(0.0, |k| x[k.0 as usize]));
+                state.voltage = anode - cathode;
+            }
+        }
+    }
+
+    /// Lets the next limiting start where each junction begins to conduct.
+    pub fn prime_junctions(&mut self) {
+        for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
+            if let Some(junction) = &group.junction {
+                state.voltage = junction.critical;
+            }
+        }
+    }
+
+    /// r = G·x + f − b, with the laws' values of the last evaluation.
+    pub fn residual(&self, x: &[f64], t: f64, r: &mut [f64]) {
+        r.fill(0.0);
+        self.system.conductances.add_product(1.0, x, r);
+        for (row, value) in &self.system.constants {
+            r[*row as usize] -= self.drive * value;
+        }
+        for (segment, source) in self.segments.iter().zip(&self.system.sources) {
+            let value = self.drive * segment.value(t);
+            for (row, factor) in &source.into {
+                r[*row as usize] -= factor * value;
+            }
+        }
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (value, target) in state.values.iter().zip(&group.targets) {
+                if let Target::Equations(into) = target {
+                    for (row, factor) in into {
+                        r[*row as usize] += factor * value;
+                    }
+                }
+            }
+        }
+        if self.gmin != 0.0 {
+            for (r, x) in r.iter_mut().zip(x).take(self.system.nodes) {
+                *r += self.gmin * x;
+            }
+        }
+        if self.pin_initial {
+            for (node, value) in &self.system.initial {
+                r[*node as usize] += PIN * (x[*node as usize] - value);
+            }
+        }
+    }
+
+    /// s = sums of the magnitudes of the same terms, for judging a residual.
+    pub fn term_sizes(&self, x: &[f64], t: f64, s: &mut [f64]) {
+        s.fill(0.0);
+        for (row, sum) in s.iter_mut().enumerate().take(self.system.equations()) {
+            for (column, value) in self.system.conductances.row(row) {
+                *sum += (value * x[column]).abs();
+            }
+        }
+        for (row, value) in &self.system.constants {
+            s[*row as usize] += value.abs();
+        }
+        for (segment, source) in self.segments.iter().zip(&self.system.sources) {
+            let value = segment.value(t).abs();
+            for (row, factor) in &source.into {
+                s[*row as usize] += factor.abs() * value;
+            }
+        }
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (o, target) in group.targets.iter().enumerate() {
+                if let Target::Equations(into) = target {
+                    // A law's own terms cancel too: its slopes say how large they are.
+                    let mut size = state.values[o].abs();
+                    for p in group.laws.row(o) {
+                        size =
+                            size.max((state.partials[p] * self.inputs[group.laws.input(p)]).abs());
+                    }
+                    for (row, factor) in into {
+                        s[*row as usize] += factor.abs() * size;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Q = C·x + q, with the laws' values of the last evaluation.
+    pub fn charges(&self, x: &[f64], q: &mut [f64]) {
+        q.fill(0.0);
+        self.system.charges.add_product(1.0, x, q);
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (value, target) in state.values.iter().zip(&group.targets) {
+                if let Target::Charge(k) = target {
+                    q[*k as usize] += value;
+                }
+            }
+        }
+    }
+
+    /// y += factor·(C + q')·u, with the derivatives of the last linearisation.
+    pub fn add_charge_change(&self, factor: f64, u: &[f64], y: &mut [f64]) {
+        self.system.charges.add_product(factor, u, y);
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (partial, charge, unknown) in &group.charge_slopes {
+                y[*charge as usize] +=
+                    factor * state.partials[*partial as usize] * u[*unknown as usize];
+            }
+        }
+    }
+
+    /// s = ∂/∂t (b − f), with the derivatives of the last linearisation.
+    pub fn time_slopes(&self, t: f64, s: &mut [f64]) {
+        s.fill(0.0);
+        for (segment, source) in self.segments.iter().zip(&self.system.sources) {
+            let slope = segment.derivative(t);
+            for (row, factor) in &source.into {
+                s[*row as usize] += factor * slope;
+            }
+        }
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (partial, row, factor) in &group.by_time {
+                s[*row as usize] -= factor * state.partials[*partial as usize];
+            }
+        }
+    }
+
+    /// Fills and factorises W(α) with the derivatives of the last linearisation.
+    pub fn factorise_dynamic(&mut self, alpha: f64) -> Result<(), Singular> {
+        if self.factored_alpha == Some(alpha) {
+            return Ok(());
+        }
+        let plan = &self.system.dynamic;
+        let values = &mut self.dynamic.values;
+        values.copy_from_slice(&plan.fixed);
+        for place in &plan.storage {
+            values[place.slot as usize] += alpha * place.factor;
+        }
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for place in &group.dynamic {
+                values[place.slot as usize] +=
+                    place.factor * state.partials[place.partial as usize];
+            }
+            for place in &group.dynamic_charge {
+                values[place.slot as usize] +=
+                    alpha * place.factor * state.partials[place.partial as usize];
+            }
+        }
+        let result = self.dynamic.factorise(plan, &mut self.statistics);
+        let constant = result.is_ok() && self.groups.is_empty();
+        self.factored_alpha = constant.then_some(alpha);
+        result
+    }
+
+    /// Solves W·y = y in place.
+    pub fn solve_dynamic(&mut self, y: &mut [f64]) {
+        self.dynamic.solve(&mut self.statistics, y);
+    }
+
+    /// Fills and factorises the frozen network. `held` says which charges keep their value; the others have w = 0.
+    pub fn factorise_frozen(&mut self, held: &[bool]) -> Result<(), Singular> {
+        let plan = &self.system.frozen;
+        let values = &mut self.frozen.values;
+        values.copy_from_slice(&plan.fixed);
+        for place in &plan.storage {
+            if held[place.partial as usize] {
+                values[place.slot as usize] += place.factor;
+            }
+        }
+        for (slot, held) in self.system.free_slots.iter().zip(held) {
+            if !held {
+                values[*slot as usize] = 1.0;
+            }
+        }
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for place in &group.frozen {
+                values[place.slot as usize] +=
+                    place.factor * state.partials[place.partial as usize];
+            }
+            for (charge, place) in &group.frozen_charge {
+                if held[*charge as usize] {
+                    values[place.slot as usize] +=
+                        place.factor * state.partials[place.partial as usize];
+                }
+            }
+        }
+        if self.gmin != 0.0 {
+            for slot in &self.system.node_slots {
+                values[*slot as usize] += self.gmin;
+            }
+        }
+        if self.pin_initial {
+            for (node, _) in &self.system.initial {
+                if let Some(slot) = self.system.node_slots.get(*node as usize) {
+                    values[*slot as usize] += PIN;
+                }
+            }
+        }
+        self.frozen.factorise(plan, &mut self.statistics)
+    }
+
+    /// Solves with the frozen network's factors, in place.
+    pub fn solve_frozen(&mut self, y: &mut [f64]) {
+        self.frozen.solve(&mut self.statistics, y);
+    }
+
+    /// Forgets the pivots chosen: the next matrices differ in structure (modes, charges held).
+    pub fn forget_pivots(&mut self) {
+        self.frozen.lu = None;
+        self.dynamic.lu = None;
+        self.factored_alpha = None;
+    }
+
+    /// Controls of the modes.
+    pub fn controls(&mut self, x: &[f64], t: f64, out: &mut [f64]) {
+        if out.is_empty() {
+            return;
+        }
+        self.set_inputs(x, t);
+        self.system.controls.values(&self.inputs, &mut self.control_registers, out);
+    }
+
+    /// Output columns.
+    pub fn outputs(&mut self, x: &[f64], w: &[f64], t: f64, out: &mut [f64]) {
+        self.set_inputs(x, t);
+        let from = self.inputs.len() - w.len();
+        self.inputs[from..].copy_from_slice(w);
+        self.system.output_laws.values(&self.inputs, &mut self.output_registers, out);
+    }
+
+    /// The first law whose value or derivative is no finite number.
+    pub fn non_finite_law(&self) -> Option<crate::circuit::DeviceId> {
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            for (o, value) in state.values.iter().enumerate() {
+                let slopes = group.laws.row(o).all(|p| state.partials[p].is_finite());
+                if !value.is_finite() || !slopes {
+                    return device_of(group, o);
+                }
+            }
+        }
+        None
+    }
+}
+
+fn device_of(group: &LawGroup, o: usize) -> Option<crate::circuit::DeviceId> {
+    group.devices.get(o).copied()
+}
+
+/// Limits the change of a junction's voltage (L. W. Nagel, SPICE2, ERL-M520, 1975, section 4.2): above the critical
+/// voltage the *current* may change in proportion to the step, so the voltage by its logarithm.
+fn limit_junction(new: f64, old: f64, thermal: f64, critical: f64) -> f64 {
+    if new <= critical || (new - old).abs() <= 2.0 * thermal {
+        return new;
+    }
+    if old > 0.0 {
+        let argument = 1.0 + (new - old) / thermal;
+        if argument > 0.0 { old + thermal * libm::log(argument) } else { critical }
+    } else {
+        thermal * libm::log(new / thermal)
+    }
+}

@@ -1,0 +1,330 @@
+//! Newton's method on a step's equations and on the frozen network, with tests of both update and residual.
+
+use super::network::Network;
+use crate::circuit::DeviceId;
+use crate::linear::{Cause, Singular};
+
+/// Why a solution was not found.
+#[derive(Clone, Debug)]
+pub(crate) enum Cut {
+    /// The updates did not shrink; the equation with the largest residual for its terms.
+    NoConvergence { worst: usize },
+    /// The matrix is singular.
+    Singular(Singular),
+    /// A value is infinite or no number; the device whose law it is, where one is to blame.
+    NonFinite { device: Option<DeviceId> },
+}
+
+/// Buffers of Newton's method.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    residual: Vec<f64>,
+    rates: Vec<f64>,
+    sizes: Vec<f64>,
+    update: Vec<f64>,
+}
+
+impl Scratch {
+    pub fn new(n: usize, charges: usize) -> Scratch {
+        Scratch {
+            residual: vec![0.0; n + charges],
+            rates: vec![0.0; charges],
+            sizes: vec![0.0; n + charges],
+            update: vec![0.0; n + charges],
+        }
+    }
+}
+
+/// A residual as large as this part of the terms it is made of is none.
+const RESIDUAL: f64 = 1e-6;
+
+/// Most iterations of one step.
+const MOST: u64 = 12;
+
+/// What an implicit step solves: G·x + f(x, t) + A·(α·Q(x) + β) = b(t).
+pub(crate) struct Stage<'a> {
+    pub t: f64,
+    pub alpha: f64,
+    pub beta: &'a [f64],
+    /// Weights of the update test; infinite where an unknown is not tested.
+    pub weights: &'a [f64],
+    /// Largest weighted error of iteration.
+    pub tolerance: f64,
+}
+
+/// Solves a stage from the guess in `x`; leaves Q(x) in `q`, and the last factors of W(α) in the network.
+pub(crate) fn solve_stage(
+    network: &mut Network,
+    stage: &Stage,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> Result<(), Cut> {
+    let n = x.len();
+    let linear = network.system.is_linear();
+    let mut before = f64::INFINITY;
+    for iteration in 0..MOST {
+        network.statistics.iterations += 1;
+        let limited = network.linearise(x, stage.t, true);
+        network.charges(x, q);
+        let residual = &mut scratch.residual[..n];
+        stage_residual(network, stage, x, q, residual, &mut scratch.rates);
+        network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
+        network.solve_dynamic(residual);
+        let mut update: f64 = 0.0;
+        for ((x, dx), weight) in x.iter_mut().zip(residual.iter()).zip(stage.weights) {
+            if !dx.is_finite() {
+                return Err(Cut::NonFinite { device: network.non_finite_law() });
+            }
+            *x -= dx;
+            update = update.max(dx.abs() / weight);
+        }
+        if linear {
+            network.charges(x, q);
+            return Ok(());
+        }
+        let rate = if iteration == 0 { 0.0 } else { update / before };
+        let done = match iteration {
+            0 => update <= 0.1 * stage.tolerance,
+            _ => rate < 1.0 && update * rate / (1.0 - rate) <= stage.tolerance,
+        };
+        before = update;
+        if limited || !done {
+            if !limited && iteration >= 4 && rate > 2.0 {
+                break;
+            }
+            continue;
+        }
+        network.evaluate(x, stage.t);
+        network.charges(x, q);
+        if residual_is_small(network, stage, x, q, scratch) {
+            return Ok(());
+        }
+    }
+    network.evaluate(x, stage.t);
+    network.charges(x, q);
+    let worst = worst_row(network, stage, x, q, scratch);
+    Err(Cut::NoConvergence { worst })
+}
+
+fn stage_residual(
+    network: &Network,
+    stage: &Stage,
+    x: &[f64],
+    q: &[f64],
+    residual: &mut [f64],
+    rates: &mut [f64],
+) {
+    network.residual(x, stage.t, residual);
+    for ((rate, q), beta) in rates.iter_mut().zip(q).zip(stage.beta) {
+        *rate = stage.alpha * q + beta;
+    }
+    network.system.rates.add_transposed(1.0, rates, residual);
+}
+
+/// Each residual against the terms of its row; |α·Q| + |β| are the terms of a rate.
+fn relative_residuals(
+    network: &Network,
+    stage: &Stage,
+    x: &[f64],
+    q: &[f64],
+    scratch: &mut Scratch,
+) -> (f64, usize) {
+    let n = x.len();
+    let Scratch { residual, rates, sizes, .. } = scratch;
+    stage_residual(network, stage, x, q, &mut residual[..n], rates);
+    network.term_sizes(x, stage.t, &mut sizes[..n]);
+    for (k, (q, beta)) in q.iter().zip(stage.beta).enumerate() {
+        for (row, factor) in network.system.rates.row(k) {
+            sizes[row] += factor.abs() * ((stage.alpha * q).abs() + beta.abs());
+        }
+    }
+    worst(&residual[..n], &sizes[..n])
+}
+
+fn residual_is_small(
+    network: &Network,
+    stage: &Stage,
+    x: &[f64],
+    q: &[f64],
+    scratch: &mut Scratch,
+) -> bool {
+    relative_residuals(network, stage, x, q, scratch).0 <= RESIDUAL
+}
+
+fn worst_row(
+    network: &Network,
+    stage: &Stage,
+    x: &[f64],
+    q: &[f64],
+    scratch: &mut Scratch,
+) -> usize {
+    relative_residuals(network, stage, x, q, scratch).1
+}
+
+fn worst(residual: &[f64], sizes: &[f64]) -> (f64, usize) {
+    let mut largest = (0.0, 0);
+    for (row, (r, size)) in residual.iter().zip(sizes).enumerate() {
+        // A row made of nothing but exact zeros is satisfied.
+        let ratio = if *r == 0.0 { 0.0 } else { r.abs() / size.max(f64::MIN_POSITIVE) };
+        if ratio > largest.0 || ratio.is_nan() {
+            largest = (if ratio.is_nan() { f64::INFINITY } else { ratio }, row);
+        }
+    }
+    largest
+}
+
+/// A singular matrix with an entry that is no number is a law's fault, not the circuit's.
+fn explain(network: &Network, singular: Singular) -> Cut {
+    match singular.cause {
+        Cause::NotFinite => Cut::NonFinite { device: network.non_finite_law() },
+        _ => Cut::Singular(singular),
+    }
+}
+
+/// What is asked of the frozen network: charges `held` have the values `targets`, the others have no rate.
+pub(crate) struct Frozen<'a> {
+    pub t: f64,
+    pub held: &'a [bool],
+    pub targets: &'a [f64],
+    /// What an update is compared with where the unknown itself is small; in [`correct_frozen`] everywhere.
+    pub floors: &'a [f64],
+    /// Most iterations.
+    pub most: u64,
+    /// Begin with junctions where they begin to conduct instead of at the guess.
+    pub prime: bool,
+}
+
+/// Solves the frozen network from the guess in `x`, until only rounding is left.
+pub(crate) fn solve_frozen(
+    network: &mut Network,
+    frozen: &Frozen,
+    x: &mut [f64],
+    w: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> Result<(), Cut> {
+    let n = x.len();
+    if frozen.prime {
+        network.prime_junctions();
+    } else {
+        network.remember_junctions(x);
+    }
+    let linear = network.system.is_linear();
+    let mut before = f64::INFINITY;
+    let mut step = 1.0;
+    for iteration in 0..frozen.most {
+        network.statistics.iterations += 1;
+        let limited = network.linearise(x, frozen.t, true) || (frozen.prime && iteration == 0);
+        network.charges(x, q);
+        frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+        if scratch.residual.iter().any(|r| !r.is_finite()) {
+            // Back half of the last step: the law is not defined where it led.
+            if iteration == 0 || step < 1e-3 {
+                return Err(Cut::NonFinite { device: network.non_finite_law() });
+            }
+            step *= 0.5;
+            for (x, dx) in x.iter_mut().zip(&scratch.update) {
+                *x += step * dx;
+            }
+            continue;
+        }
+        step = 1.0;
+        let (ratio, _) = relative_frozen(network, frozen, x, w, scratch);
+        network.factorise_frozen(frozen.held).map_err(|singular| explain(network, singular))?;
+        scratch.update.copy_from_slice(&scratch.residual);
+        network.solve_frozen(&mut scratch.update);
+        let mut update: f64 = 0.0;
+        for ((x, dx), floor) in x.iter_mut().zip(&scratch.update[..n]).zip(frozen.floors) {
+            if !dx.is_finite() {
+                return Err(Cut::NonFinite { device: network.non_finite_law() });
+            }
+            *x -= dx;
+            update = update.max(dx.abs() / (x.abs() + floor));
+        }
+        for (w, dw) in w.iter_mut().zip(&scratch.update[n..]) {
+            *w -= dw;
+        }
+        // Settled: the residual was rounding already, and the update is small or has ceased to shrink.
+        let settled = update <= 1e-14
+            || (ratio <= 1e-9 && (update <= 1e-9 || (iteration >= 2 && update >= 0.5 * before)));
+        before = update;
+        if linear || (settled && !limited) {
+            network.evaluate(x, frozen.t);
+            network.charges(x, q);
+            frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+            if relative_frozen(network, frozen, x, w, scratch).0 <= RESIDUAL {
+                return Ok(());
+            }
+            if linear {
+                break;
+            }
+        }
+    }
+    network.evaluate(x, frozen.t);
+    network.charges(x, q);
+    frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+    let (_, worst) = relative_frozen(network, frozen, x, w, scratch);
+    Err(Cut::NoConvergence { worst })
+}
+
+/// One correction with the factors at hand: for rows, where the guess is good already. Returns the largest update
+/// relative to the floors.
+pub(crate) fn correct_frozen(
+    network: &mut Network,
+    frozen: &Frozen,
+    x: &mut [f64],
+    w: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> f64 {
+    let n = x.len();
+    network.evaluate(x, frozen.t);
+    network.charges(x, q);
+    frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+    network.solve_frozen(&mut scratch.residual);
+    let mut update: f64 = 0.0;
+    for ((x, dx), weight) in x.iter_mut().zip(&scratch.residual[..n]).zip(frozen.floors) {
+        *x -= dx;
+        let size = dx.abs() / weight;
+        update = if size.is_nan() { f64::INFINITY } else { update.max(size) };
+    }
+    for (w, dw) in w.iter_mut().zip(&scratch.residual[n..]) {
+        *w -= dw;
+    }
+    update
+}
+
+fn frozen_residual(
+    network: &Network,
+    frozen: &Frozen,
+    x: &[f64],
+    w: &[f64],
+    q: &[f64],
+    residual: &mut [f64],
+) {
+    let n = x.len();
+    network.residual(x, frozen.t, &mut residual[..n]);
+    network.system.rates.add_transposed(1.0, w, &mut residual[..n]);
+    for (k, r) in residual[n..].iter_mut().enumerate() {
+        *r = if frozen.held[k] { q[k] - frozen.targets[k] } else { w[k] };
+    }
+}
+
+fn relative_frozen(
+    network: &Network,
+    frozen: &Frozen,
+    x: &[f64],
+    w: &[f64],
+    scratch: &mut Scratch,
+) -> (f64, usize) {
+    let n = x.len();
+    let Scratch { residual, sizes, .. } = scratch;
+    network.term_sizes(x, frozen.t, &mut sizes[..n]);
+    for (k, w) in w.iter().enumerate() {
+        for (row, factor) in network.system.rates.row(k) {
+            sizes[row] += (factor * w).abs();
+        }
+    }
+    worst(&residual[..n], &sizes[..n])
+}

@@ -1,0 +1,124 @@
+//! What a run cost: counters that are the same on every machine.
+
+use serde::Serialize;
+use std::fmt;
+
+/// Counters of one run.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Statistics {
+    /// The integration method that ran.
+    pub method: String,
+    /// Why it was chosen.
+    pub reason: String,
+    /// Equations of the circuit, charges and fluxes, entries of the matrix.
+    pub equations: usize,
+    /// Charges and fluxes.
+    pub charges: usize,
+    /// Entries of the matrix.
+    pub entries: usize,
+    /// Steps that were kept.
+    pub accepted: u64,
+    /// Steps that were cut, by cause.
+    pub rejected: Rejected,
+    /// Evaluations of the laws, values only or with their derivatives.
+    pub evaluations: u64,
+    /// Evaluations that also gave derivatives.
+    pub jacobians: u64,
+    /// Factorisations with a new choice of pivots.
+    pub factorisations: u64,
+    /// Factorisations that replayed the chosen pivots.
+    pub refactorisations: u64,
+    /// Solutions of a linear system.
+    pub solves: u64,
+    /// Newton iterations of implicit steps, of starts and of operating points.
+    pub iterations: u64,
+    /// Events located (switches).
+    pub events: u64,
+    /// Corners of sources landed on.
+    pub corners: u64,
+    /// Rows written.
+    pub rows: u64,
+    /// Accepted steps of the pilot pass that finds the magnitudes of the unknowns.
+    pub pilot: u64,
+}
+
+/// Why steps were cut.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Rejected {
+    /// Local error above the tolerance.
+    pub error: u64,
+    /// Newton's method did not converge.
+    pub newton: u64,
+    /// A singular matrix.
+    pub singular: u64,
+    /// A value that is no number or infinite.
+    pub non_finite: u64,
+    /// A step redone to end on an event.
+    pub event: u64,
+}
+
+impl Rejected {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.error + self.newton + self.singular + self.non_finite + self.event
+    }
+}
+
+impl Statistics {
+    /// As one JSON object, with `"schema": 1`.
+    pub fn to_json(&self) -> serde_json::Value {
+        let mut object = serde_json::Map::new();
+        object.insert("schema".into(), 1.into());
+        if let Ok(serde_json::Value::Object(counters)) = serde_json::to_value(self) {
+            object.extend(counters);
+        }
+        serde_json::Value::Object(object)
+    }
+
+    /// Adds the work (not the steps, rows or events) of another pass.
+    pub fn add_work(&mut self, other: &Statistics) {
+        self.evaluations += other.evaluations;
+        self.jacobians += other.jacobians;
+        self.factorisations += other.factorisations;
+        self.refactorisations += other.refactorisations;
+        self.solves += other.solves;
+        self.iterations += other.iterations;
+    }
+}
+
+impl fmt::Display for Statistics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "method           {} ({})", self.method, self.reason)?;
+        writeln!(
+            f,
+            "system           {} equations, {} charges and fluxes, {} matrix entries",
+            self.equations, self.charges, self.entries
+        )?;
+        writeln!(f, "steps            {} accepted, {} cut", self.accepted, self.rejected.total())?;
+        let r = &self.rejected;
+        for (count, cause) in [
+            (r.error, "local error"),
+            (r.newton, "no convergence"),
+            (r.singular, "singular matrix"),
+            (r.non_finite, "not a number"),
+            (r.event, "redone to an event"),
+        ] {
+            if count > 0 {
+                writeln!(f, "                   {count} {cause}")?;
+            }
+        }
+        if self.pilot > 0 {
+            writeln!(f, "pilot pass       {} steps", self.pilot)?;
+        }
+        writeln!(f, "evaluations      {} ({} with derivatives)", self.evaluations, self.jacobians)?;
+        writeln!(
+            f,
+            "factorisations   {} new, {} replayed",
+            self.factorisations, self.refactorisations
+        )?;
+        writeln!(f, "solves           {}", self.solves)?;
+        writeln!(f, "iterations       {}", self.iterations)?;
+        writeln!(f, "corners, events  {}, {}", self.corners, self.events)?;
+        write!(f, "rows             {}", self.rows)
+    }
+}

@@ -1,0 +1,343 @@
+//! A compiled circuit: sparse static parts, one program for all laws, and the patterns of the two matrices.
+//!
+//! ```text
+//! G·x + f(x, t, m) + A·d/dt Q(x) = b(t),     Q(x) = C·x + q(x)
+//! dynamic matrix   W(α) = G + f' + α·A·(C + q')                 n × n        α = 1/(γh)
+//! frozen network   F    = [ G + f'   A ]   unknowns (x, w)       (n + K)²     w = dQ/dt
+//!                         [ C + q'   0 ]
+//! ```
+//!
+//! A row of F that belongs to a charge left free reads `w_k = 0` instead (operating point), which is why the pattern
+//! keeps a place for it.
+
+use super::laws::LawSet;
+use crate::circuit::stamps::{DeviceLabel, Junction, Unknown};
+use crate::circuit::{DeviceId, Waveform};
+use crate::linear::Pattern;
+use crate::source::Span;
+use std::fmt;
+
+/// A sparse list of rows: row `r` holds the entries `starts[r]..starts[r + 1]`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    pub starts: Vec<u32>,
+    pub columns: Vec<u32>,
+    pub values: Vec<f64>,
+}
+
+impl Rows {
+    /// Sorts triplets by row and column; equal places add up in the order given.
+    pub fn new(rows: usize, mut triplets: Vec<(u32, u32, f64)>) -> Rows {
+        triplets.sort_by_key(|(row, column, _)| (*row, *column));
+        let mut result = Rows { starts: vec![0; rows + 1], columns: vec![], values: vec![] };
+        let mut last = None;
+        for (row, column, value) in triplets {
+            if last == Some((row, column)) {
+                if let Some(sum) = result.values.last_mut() {
+                    *sum += value;
+                }
+                continue;
+            }
+            last = Some((row, column));
+            result.columns.push(column);
+            result.values.push(value);
+            result.starts[row as usize + 1] += 1;
+        }
+        for row in 0..rows {
+            result.starts[row + 1] += result.starts[row];
+        }
+        result
+    }
+
+    /// Entries of a row.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[row] as usize..self.starts[row + 1] as usize;
+        self.columns[range.clone()].iter().zip(&self.values[range]).map(|(c, v)| (*c as usize, *v))
+    }
+
+    /// All entries as (row, column, value).
+    pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        (0..self.starts.len().saturating_sub(1))
+            .flat_map(move |row| self.row(row).map(move |(column, value)| (row, column, value)))
+    }
+
+    /// y += factor·(rows · x)
+    pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+        let mut from = self.starts[0] as usize;
+        for (sum, end) in y.iter_mut().zip(&self.starts[1..]) {
+            let to = *end as usize;
+            let mut row = 0.0;
+            for (column, value) in self.columns[from..to].iter().zip(&self.values[from..to]) {
+                row += value * x[*column as usize];
+            }
+            *sum += factor * row;
+            from = to;
+        }
+    }
+
+    /// y += factor·(transpose · w): rows are scattered into the places their columns name.
+    pub fn add_transposed(&self, factor: f64, w: &[f64], y: &mut [f64]) {
+        let mut from = self.starts[0] as usize;
+        for (weight, end) in w.iter().zip(&self.starts[1..]) {
+            let to = *end as usize;
+            let scaled = factor * weight;
+            for (column, value) in self.columns[from..to].iter().zip(&self.values[from..to]) {
+                y[*column as usize] += scaled * value;
+            }
+            from = to;
+        }
+    }
+}
+
+/// Where one value of the laws goes.
+#[derive(Clone, Debug)]
+pub(crate) enum Target {
+    /// Into these equations with these factors.
+    Equations(Vec<(u32, f64)>),
+    /// Into a charge.
+    Charge(u32),
+}
+
+/// A place of a matrix that a partial derivative is added to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Index of the partial derivative.
+    pub partial: u32,
+    /// Slot of the matrix.
+    pub slot: u32,
+    /// Factor.
+    pub factor: f64,
+}
+
+/// The laws that Newton's method evaluates together, at the unknowns themselves or at a limited junction voltage.
+#[derive(Clone, Debug)]
+pub(crate) struct LawGroup {
+    /// Programs for the values and for all partial derivatives.
+    pub laws: LawSet,
+    /// Where each value goes.
+    pub targets: Vec<Target>,
+    /// Where each partial derivative by an unknown goes; `None` for those by time.
+    pub dynamic: Vec<Place>,
+    /// The same for charges, times α.
+    pub dynamic_charge: Vec<Place>,
+    /// The same in the frozen network.
+    pub frozen: Vec<Place>,
+    /// Partial derivatives of charges in the frozen network, with their charge.
+    pub frozen_charge: Vec<(u32, Place)>,
+    /// Partial derivatives by time: (partial, equation, factor).
+    pub by_time: Vec<(u32, u32, f64)>,
+    /// Partial derivatives of charges: (partial, charge, unknown).
+    pub charge_slopes: Vec<(u32, u32, u32)>,
+    /// The junction whose voltage is limited.
+    pub junction: Option<Junction>,
+    /// Devices of the values, for messages.
+    pub devices: Vec<DeviceId>,
+}
+
+/// An independent source.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    pub waveform: Waveform,
+    pub into: Vec<(u32, f64)>,
+}
+
+/// Thresholds of a mode; its control is a value of [`System::controls`].
+#[derive(Clone, Debug)]
+pub(crate) struct ModeData {
+    pub device: DeviceId,
+    pub on: f64,
+    pub off: f64,
+    pub initial: Option<bool>,
+}
+
+/// A matrix's pattern with its static part.
+#[derive(Clone, Debug)]
+pub(crate) struct MatrixPlan {
+    pub pattern: Pattern,
+    /// G (and in the frozen network A), by slot.
+    pub fixed: Vec<f64>,
+    /// A·C, by slot, times α; in the frozen network the rows of C with their charge.
+    pub storage: Vec<Place>,
+}
+
+/// A compiled circuit.
+#[derive(Clone, Debug)]
+pub struct System {
+    /// Unknowns: node voltages, branch currents, then rates dQ/dt that laws speak of.
+    pub unknowns: Vec<Unknown>,
+    /// Number of node voltages.
+    pub nodes: usize,
+    /// Output columns.
+    pub outputs: Vec<String>,
+    /// Names and places of the devices.
+    pub devices: Vec<DeviceLabel>,
+    pub(crate) charge_devices: Vec<DeviceId>,
+    pub(crate) conductances: Rows,
+    /// Constant terms on the right-hand side.
+    pub(crate) constants: Vec<(u32, f64)>,
+    /// C: one row for each charge.
+    pub(crate) charges: Rows,
+    /// Aᵀ: one row for each charge, columns are equations.
+    pub(crate) rates: Rows,
+    /// Initial charges, where cards state them.
+    pub(crate) initial_charges: Vec<Option<f64>>,
+    /// Initial node voltages of `.ic`.
+    pub(crate) initial: Vec<(u32, f64)>,
+    /// Whether a charge has a non-linear part.
+    pub(crate) curved: Vec<bool>,
+    pub(crate) groups: Vec<LawGroup>,
+    pub(crate) sources: Vec<Source>,
+    pub(crate) modes: Vec<ModeData>,
+    pub(crate) controls: LawSet,
+    pub(crate) output_laws: LawSet,
+    /// Whether output columns speak of rates dQ/dt.
+    pub(crate) output_rates: bool,
+    pub(crate) dynamic: MatrixPlan,
+    pub(crate) frozen: MatrixPlan,
+    /// Slots of the nodes' diagonal entries in the frozen matrix, for gmin.
+    pub(crate) node_slots: Vec<u32>,
+    /// Slots of w_k in charge k's own row of the frozen matrix.
+    pub(crate) free_slots: Vec<u32>,
+}
+
+impl System {
+    /// Number of unknowns and equations.
+    pub fn equations(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    /// Number of charges and fluxes.
+    pub fn charges(&self) -> usize {
+        self.charge_devices.len()
+    }
+
+    /// Whether any law is an exponential junction.
+    pub fn has_junctions(&self) -> bool {
+        self.groups.iter().any(|group| group.junction.is_some())
+    }
+
+    /// Whether every equation is linear with constant coefficients (for fixed modes).
+    pub fn is_linear(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// A device's name.
+    pub fn device_name(&self, id: DeviceId) -> &str {
+        self.devices.get(id.0 as usize).map_or("?", |device| device.name.as_str())
+    }
+
+    /// A device's place.
+    pub fn device_span(&self, id: DeviceId) -> Span {
+        self.devices.get(id.0 as usize).map_or(Span::NONE, |device| device.span)
+    }
+
+    /// Number of inputs of the programs: unknowns, time, modes, rates.
+    pub(crate) fn inputs(&self) -> usize {
+        self.equations() + 1 + self.modes.len() + self.charges()
+    }
+
+    /// What an input of the programs is called.
+    fn input_name(&self, input: usize) -> String {
+        let n = self.equations();
+        if input < n {
+            self.unknowns[input].name.clone()
+        } else if input == n {
+            "time".into()
+        } else if input <= n + self.modes.len() {
+            format!("mode({})", self.device_name(self.modes[input - n - 1].device))
+        } else {
+            let charge = self.charge_devices[input - n - 1 - self.modes.len()];
+            format!("d/dt({})", self.device_name(charge))
+        }
+    }
+}
+
+/// The text of `--emit system`.
+impl fmt::Display for System {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "system of {} equations, {} charges and fluxes, {} sources, {} modes; matrix entries {} dynamic, {} frozen",
+            self.equations(),
+            self.charges(),
+            self.sources.len(),
+            self.modes.len(),
+            self.dynamic.pattern.len(),
+            self.frozen.pattern.len()
+        )?;
+        for (k, unknown) in self.unknowns.iter().enumerate() {
+            write!(f, "x{k} = {}", unknown.name)?;
+            match unknown.nominal {
+                Some(nominal) => writeln!(f, "   nominal {nominal:e}")?,
+                None => writeln!(f)?,
+            }
+        }
+        for row in 0..self.equations() {
+            write!(f, "equation of {}:", self.unknowns[row].name)?;
+            for (column, value) in self.conductances.row(row) {
+                write!(f, " {value:+e}·{}", self.unknowns[column].name)?;
+            }
+            for (k, equation, factor) in self.rates.triplets() {
+                if equation == row {
+                    write!(f, " {factor:+}·d/dt Q{k}")?;
+                }
+            }
+            let mut law = 0;
+            for group in &self.groups {
+                for target in &group.targets {
+                    if let Target::Equations(into) = target {
+                        for (_, factor) in into.iter().filter(|(r, _)| *r as usize == row) {
+                            write!(f, " {factor:+}·f{law}")?;
+                        }
+                    }
+                    law += 1;
+                }
+            }
+            write!(f, " =")?;
+            let mut empty = true;
+            for (_, value) in self.constants.iter().filter(|(r, _)| *r as usize == row) {
+                write!(f, " {value:+e}")?;
+                empty = false;
+            }
+            for (s, source) in self.sources.iter().enumerate() {
+                for (_, factor) in source.into.iter().filter(|(r, _)| *r as usize == row) {
+                    write!(f, " {factor:+}·b{s}(t)")?;
+                    empty = false;
+                }
+            }
+            writeln!(f, "{}", if empty { " 0" } else { "" })?;
+        }
+        for k in 0..self.charges() {
+            write!(f, "Q{k} of {}:", self.device_name(self.charge_devices[k]))?;
+            for (column, value) in self.charges.row(k) {
+                write!(f, " {value:+e}·{}", self.unknowns[column].name)?;
+            }
+            writeln!(f, "{}", if self.curved[k] { " + law" } else { "" })?;
+        }
+        let mut law = 0;
+        for group in &self.groups {
+            for (o, target) in group.targets.iter().enumerate() {
+                let device = self.device_name(group.devices[o]);
+                let partials = group.laws.row(o);
+                let slopes: Vec<String> =
+                    partials.map(|p| self.input_name(group.laws.input(p))).collect();
+                let what = match target {
+                    Target::Equations(_) => format!("f{law}"),
+                    Target::Charge(k) => format!("law of Q{k}"),
+                };
+                writeln!(f, "{what} of {device}: slopes by {}", slopes.join(", "))?;
+                law += 1;
+            }
+            let (values, full) = group.laws.instructions();
+            writeln!(f, "  {values} instructions, {full} with slopes")?;
+        }
+        for (s, source) in self.sources.iter().enumerate() {
+            writeln!(f, "b{s}: {:?}", source.waveform)?;
+        }
+        for mode in &self.modes {
+            let device = self.device_name(mode.device);
+            writeln!(f, "mode of {device}: on above {:e}, off below {:e}", mode.on, mode.off)?;
+        }
+        Ok(())
+    }
+}
