@@ -633,3 +633,132 @@ fn elements(graph: &BondGraph, equations: &Equations, rows: &[usize]) -> String 
 fn spans(graph: &BondGraph, equations: &Equations, rows: &[usize]) -> Vec<Span> {
     origins(equations, rows).iter().map(|origin| named(graph, *origin).1).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::build::*;
+    use super::super::graph::*;
+    use super::*;
+    use crate::expr::Binary;
+
+    fn solved(graph: &BondGraph) -> (Option<InitialState>, Vec<Diagnostic>) {
+        let mut d = vec![];
+        let state = solve(graph, &Causality::default(), &mut d);
+        (state, d)
+    }
+
+    /// 1 A into two compliances of 1 F and 2 F in parallel.
+    fn parallel(first: StoreInitial, second: StoreInitial) -> (BondGraph, VertexId, VertexId) {
+        let mut b = Build::default();
+        let zero = b.zero("a");
+        let c1 = b.vertex("C", "C1", compliance(1.0, first));
+        let c2 = b.vertex("C", "C2", compliance(2.0, second));
+        let source = b.vertex("Sf", "I", flow_source(n(1.0)));
+        b.fan(zero, &[c1, c2]);
+        b.bond(source, zero);
+        (b.graph, c1, c2)
+    }
+
+    #[test]
+    fn a_storage_without_a_value_takes_the_implied_one() {
+        for swap in [false, true] {
+            let (one, other) = (power(3.0), StoreInitial::Unstated);
+            let (first, second) = if swap { (other, one) } else { (one, other) };
+            let (graph, c1, c2) = parallel(first, second);
+            let (state, d) = solved(&graph);
+            assert!(d.is_empty(), "{d:?}");
+            let state = state.unwrap();
+            let of = |id: VertexId| state.storages[id.index()].unwrap();
+            assert!((of(c1).stored - 3.0).abs() < 1e-12 && (of(c2).stored - 6.0).abs() < 1e-12);
+            // The current divides as the capacitances do.
+            assert!((state.flows[0] - 1.0 / 3.0).abs() < 1e-7, "{:?}", state.flows);
+        }
+    }
+
+    #[test]
+    fn stated_values_that_contradict_each_other_are_shown() {
+        let (graph, ..) = parallel(power(3.0), stored(5.0));
+        let (state, d) = solved(&graph);
+        assert!(state.is_none());
+        assert_eq!(d[0].code, "E0502");
+        let (graph, ..) = parallel(power(3.0), stored(6.0));
+        assert!(solved(&graph).0.is_some());
+    }
+
+    #[test]
+    fn laws_are_inverted_when_they_have_one_root() {
+        let cube = |sign: f64| plus(times(n(sign), q()), q().binary(Binary::Power, n(3.0)));
+        let graph = |law: Expr, out: bool| {
+            let mut b = Build::default();
+            let law = Law::Store {
+                kind: Storage::Compliance,
+                law: StoreLaw::OfStored(law),
+                initial: power(10.0),
+            };
+            let c = b.vertex("C", "spring", law);
+            let r = b.vertex("R", "R", resistor(2.0));
+            if out {
+                b.bond(c, r)
+            } else {
+                b.bond(r, c)
+            };
+            b.graph
+        };
+        for out in [false, true] {
+            let (state, _) = solved(&graph(cube(1.0), out));
+            let state = state.unwrap();
+            assert_eq!(state.storages[0], Some(StorageValue { stored: 2.0, power: 10.0 }));
+            assert_eq!(state.efforts, [10.0]);
+            assert_eq!(state.flows, [if out { 5.0 } else { -5.0 }], "along the half arrow");
+        }
+        let (state, d) = solved(&graph(plus(cube(-1.0), n(10.0)), false));
+        assert!(state.is_none());
+        assert_eq!(d[0].code, "E0503");
+        assert!(d[0].message.contains("more than one"));
+    }
+
+    #[test]
+    fn two_sources_of_the_same_effort_contradict_each_other() {
+        let mut b = Build::default();
+        let zero = b.zero("a");
+        let (one, other) = (
+            b.vertex("Se", "U1", effort_source(n(1.0))),
+            b.vertex("Se", "U2", effort_source(n(2.0))),
+        );
+        let r = b.vertex("R", "R", resistor(1.0));
+        b.bond(one, zero);
+        b.bond(other, zero);
+        b.bond(zero, r);
+        let (state, d) = solved(&b.graph);
+        assert!(state.is_none());
+        let error = d.iter().find(|d| d.code == "E0501").unwrap();
+        assert!(error.notes[0].contains("Se:U1") && error.notes[0].contains("Se:U2"), "{error:?}");
+    }
+
+    #[test]
+    fn a_lag_without_a_value_starts_at_rest() {
+        let mut b = Build::default();
+        let input = b.signal("u", SignalLaw::Algebraic(plus(f(), n(0.0))));
+        let c = b.vertex("C", "C", compliance(1.0, stored(4.0)));
+        let r = b.vertex("R", "R", resistor(2.0));
+        let bond = b.bond(c, r);
+        b.graph.signals[input.index()].law = SignalLaw::Algebraic(Expr::leaf(Leaf::Bond {
+            bond,
+            variable: Power::Flow,
+            negated: false,
+        }));
+        let lag = SignalId(1);
+        let difference =
+            Expr::leaf(Leaf::Signal(input)).binary(Binary::Subtract, Expr::leaf(Leaf::Signal(lag)));
+        b.signal(
+            "y",
+            SignalLaw::Integrator {
+                rate: difference.binary(Binary::Divide, n(0.1)),
+                initial: Initial::Implied,
+            },
+        );
+        let (state, d) = solved(&b.graph);
+        assert!(d.is_empty(), "{d:?}");
+        assert_eq!(state.unwrap().signals, [2.0, 2.0]);
+    }
+}

@@ -9,11 +9,12 @@ pub mod radau;
 
 use crate::bond::causality::Causality;
 use crate::bond::consistent;
-use crate::bond::equations::Unknown;
 use crate::bond::equations::compiled::Readings;
+use crate::bond::equations::{Formula, Input, Unknown};
 use crate::bond::graph::BondGraph;
 use crate::bond::initial::{self, Prepared};
 use crate::diagnostic::Diagnostic;
+use crate::expr::{Node, Unary};
 use energy::{Energy, Meter};
 use radau::{B, Radau, Statistics, Step, Stop};
 
@@ -39,6 +40,8 @@ pub struct Run {
     pub names: Vec<String>,
     /// Their values at the times asked for, in the units of the observed items; at a jump those just after it.
     pub columns: Vec<Vec<f64>>,
+    /// Of each column a magnitude that is still rounding of 0: a small part of the largest variable of its kind.
+    pub least: Vec<f64>,
     /// The balance of energy over the run.
     pub energy: Energy,
     /// Of the second, fine run.
@@ -88,8 +91,8 @@ pub fn integrate(
     let mut meter = Meter::new(graph, &prepared.equations);
     let mut end = start.clone();
     let mut failed = None;
+    let mut sizes = Sizes::new(graph, &prepared, &start);
     if until > 0.0 {
-        let mut sizes = Sizes::new(graph, &prepared, &start);
         let pilot = Settings { tolerance: 1e-4f64.max(settings.tolerance), ..*settings };
         let mut nothing = |_: &Event| {};
         let outcome =
@@ -147,6 +150,10 @@ pub fn integrate(
     if let Some(failure) = failed {
         d.push(explain(graph, &prepared, &failure));
         return None;
+    }
+    run.least = vec![0.0; run.names.len()];
+    for ((least, formula), factor) in run.least[1..].iter_mut().zip(&formulas).zip(&factors) {
+        *least = sizes.least(formula) / factor;
     }
     run.energy = energy::balance(graph, &prepared.equations, &meter.work, &start, &end);
     run.energy.junctions = meter.worst(graph);
@@ -225,6 +232,9 @@ fn first_step(radau: &mut Radau, from: f64, to: f64, y: &[f64], last: Option<f64
     careful.max(1e-9 * (to - from)).min(last.map_or(f64::INFINITY, |h| h.max(1e-9 * (to - from))))
 }
 
+/// Below this part of the largest effort or flow of the same kind a value counts as what rounding leaves of 0.
+const ROUNDING: f64 = 1e-8;
+
 /// How much more error is allowed to unknowns of index 2: their estimate carries rounding of the states divided by the
 /// step, and they do not act on the states by more than the step times their error.
 const INDEX_TWO: f64 = 100.0;
@@ -265,16 +275,37 @@ impl Sizes {
         }
     }
 
-    /// The error allowed: the tolerance times the size, and not less than a hundred-millionth of that of the largest
-    /// unknown of the same kind, below which a value is what rounding leaves of 0.
-    fn weights(&self, tolerance: f64, pilot: bool) -> Vec<f64> {
+    /// The largest effort or flow of each kind.
+    fn largest_of_kinds(&self) -> Vec<f64> {
         let mut largest = vec![0.0f64; 2 * 16];
         for (size, kind) in self.largest.iter().zip(&self.kind) {
             if let Kind::Power(kind) = kind {
                 largest[*kind] = largest[*kind].max(*size);
             }
         }
-        let least = if pilot { 1e-6 } else { 1e-8 };
+        largest
+    }
+
+    /// For an effort or a flow by itself, the magnitude below which it is what rounding leaves of 0.
+    fn least(&self, formula: &Formula) -> f64 {
+        let unknown = match &*formula.node {
+            Node::Unary(Unary::Negate, inner) => inner,
+            _ => formula,
+        };
+        match &*unknown.node {
+            Node::Leaf(Input::Unknown(k)) => match self.kind[*k as usize] {
+                Kind::Power(kind) => ROUNDING * self.largest_of_kinds()[kind],
+                Kind::Other => 0.0,
+            },
+            _ => 0.0,
+        }
+    }
+
+    /// The error allowed: the tolerance times the size, and not less than a hundred-millionth of that of the largest
+    /// unknown of the same kind, below which a value is what rounding leaves of 0.
+    fn weights(&self, tolerance: f64, pilot: bool) -> Vec<f64> {
+        let largest = self.largest_of_kinds();
+        let least = if pilot { 1e-6 } else { ROUNDING };
         self.largest
             .iter()
             .zip(self.kind.iter().zip(&self.index_two))

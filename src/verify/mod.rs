@@ -1,1 +1,10 @@
-//! Proof of the translation.
+//! The certificate of a translation, as far as it is built: trajectories and energy.
+//!
+//! The bond graph's own equations, integrated without any circuit, are held against the netlist's transient for every
+//! observed variable, and the energy of the run is balanced. What is not built is not in the report.
+
+pub mod report;
+pub mod routes;
+
+pub use report::{EnergyReport, Report, Trajectory};
+pub use routes::{Settings, judge};
