@@ -1,0 +1,354 @@
+//! Causal paths: which variable follows from which at the same instant, what determines a dependent storage, and where
+//! variables determine each other.
+//!
+//! Variables are the effort and flow of every bond, and the signals. A storage in integral causality and an integrator
+//! follow from nothing at the same instant; a storage in derivative causality gives a derivative, which ends a path too.
+
+use super::super::graph::*;
+use super::{AlgebraicLoop, Causality, Dependent, is_integral};
+use std::collections::VecDeque;
+
+/// Paths of dependent storages are listed up to this many bonds in all, so that the cost stays in proportion.
+const MOST_BONDS: usize = 1_000_000;
+
+/// What a variable follows from, as compressed lists.
+struct Follows {
+    starts: Vec<u32>,
+    from: Vec<u32>,
+}
+
+impl Follows {
+    fn of(&self, variable: usize) -> &[u32] {
+        &self.from[self.starts[variable] as usize..self.starts[variable + 1] as usize]
+    }
+}
+
+fn number(bond: BondId, power: Power) -> u32 {
+    2 * bond.0 + u32::from(power == Power::Flow)
+}
+
+fn number_of_signal(graph: &BondGraph, signal: SignalId) -> u32 {
+    2 * graph.bonds.len() as u32 + signal.0
+}
+
+/// The vertex and port that set a bond's variable.
+fn setter(graph: &BondGraph, causality: &Causality, bond: BondId, power: Power) -> Option<End> {
+    let stroke = causality.strokes.get(bond.index()).copied().flatten()?;
+    let ends = graph.bond(bond);
+    // The effort comes from the end without the stroke.
+    let from_tail = (stroke == Stroke::AtTo) == (power == Power::Effort);
+    Some(if from_tail { ends.from } else { ends.to })
+}
+
+/// Fills in dependent storages, loops and the order.
+pub fn trace(graph: &BondGraph, causality: &mut Causality) {
+    let follows = follows(graph, causality);
+    let integrators =
+        graph.signals.iter().filter(|s| matches!(s.law, SignalLaw::Integrator { .. })).count();
+    causality.order = causality.states.len() + integrators;
+    causality.loops = loops(graph, causality, &follows);
+    causality.dependent = dependent(graph, causality, &follows);
+}
+
+fn follows(graph: &BondGraph, causality: &Causality) -> Follows {
+    let mut follows = Follows { starts: vec![0], from: Vec::new() };
+    // The bond that brings each junction's common variable.
+    let mut bringing = vec![None; graph.vertices.len()];
+    for id in graph.vertex_ids() {
+        let vertex = graph.vertex(id);
+        if let Some(common) = common(&vertex.law) {
+            bringing[id.index()] = vertex.bonds.iter().copied().find(|&bond| {
+                setter(graph, causality, bond, common).is_some_and(|end| end.vertex != id)
+            });
+        }
+    }
+    for bond in graph.bond_ids() {
+        for power in [Power::Effort, Power::Flow] {
+            if let Some(end) = setter(graph, causality, bond, power) {
+                let brings = bringing[end.vertex.index()];
+                set_by(graph, causality, bond, power, end, brings, &mut follows.from);
+            }
+            follows.starts.push(follows.from.len() as u32);
+        }
+    }
+    for signal in &graph.signals {
+        if let SignalLaw::Algebraic(expr) = &signal.law {
+            read(graph, causality, expr, &mut follows.from);
+        }
+        follows.starts.push(follows.from.len() as u32);
+    }
+    follows
+}
+
+/// What all bonds of a junction share.
+fn common(law: &Law) -> Option<Power> {
+    match law {
+        Law::Zero => Some(Power::Effort),
+        Law::One => Some(Power::Flow),
+        _ => None,
+    }
+}
+
+/// What the vertex at `end` makes the variable from; `brings`: the bond that brings a junction's common variable.
+fn set_by(
+    graph: &BondGraph,
+    causality: &Causality,
+    bond: BondId,
+    power: Power,
+    end: End,
+    brings: Option<BondId>,
+    from: &mut Vec<u32>,
+) {
+    let vertex = graph.vertex(end.vertex);
+    match &vertex.law {
+        Law::Zero | Law::One => {
+            if common(&vertex.law) == Some(power) {
+                from.extend(brings.map(|other| number(other, power)));
+            } else {
+                let others = vertex.bonds.iter().filter(|&&other| other != bond);
+                from.extend(others.map(|&other| number(other, power)));
+            }
+        }
+        Law::Source { value, .. } => read(graph, causality, value, from),
+        Law::Dissipator(law) => {
+            let (Dissipation::Linear(expr) | Dissipation::Effort(expr) | Dissipation::Flow(expr)) =
+                law;
+            from.push(number(bond, power.dual()));
+            read(graph, causality, expr, from);
+        }
+        Law::Store { kind, law, .. } => {
+            if is_integral(graph, causality, end.vertex, *kind) == Some(true) {
+                let (StoreLaw::Linear(expr) | StoreLaw::OfStored(expr) | StoreLaw::OfPower(expr)) =
+                    law;
+                read(graph, causality, expr, from);
+            }
+        }
+        Law::Rate { .. } => {}
+        Law::Transformer(modulus) | Law::Gyrator(modulus) => {
+            let transformer = matches!(vertex.law, Law::Transformer(_));
+            if let Some(&other) = vertex.bonds.iter().find(|&&other| other != bond) {
+                from.push(number(other, if transformer { power } else { power.dual() }));
+            }
+            let (Modulus::Ratio(expr) | Modulus::Gain(expr)) = modulus;
+            read(graph, causality, expr, from);
+        }
+    }
+}
+
+/// The variables that an expression reads.
+fn read(graph: &BondGraph, causality: &Causality, expr: &Expr, from: &mut Vec<u32>) {
+    expr.leaves(&mut |leaf, _| match leaf {
+        Leaf::Bond { bond, variable, .. } => from.push(number(*bond, *variable)),
+        Leaf::Signal(signal) => from.push(number_of_signal(graph, *signal)),
+        Leaf::Stored(storage) => {
+            let kind = match &graph.vertex(*storage).law {
+                Law::Store { kind, .. } | Law::Rate { kind, .. } => *kind,
+                _ => return,
+            };
+            if is_integral(graph, causality, *storage, kind) == Some(false)
+                && let Some(&bond) = graph.vertex(*storage).bonds.first()
+            {
+                from.push(number(bond, kind.gives()));
+            }
+        }
+        // A law's own argument is the caller's to list.
+        Leaf::Own(_) | Leaf::Parameter(_) | Leaf::Time => {}
+    });
+}
+
+/// Sets of variables that determine each other (Tarjan's strongly connected components, 1972, without recursion).
+fn components(follows: &Follows) -> Vec<Vec<u32>> {
+    const NEW: u32 = u32::MAX;
+    let count = follows.starts.len() - 1;
+    let mut index = vec![NEW; count];
+    let mut low = vec![0u32; count];
+    let mut on_stack = vec![false; count];
+    let mut stack = Vec::new();
+    let mut calls: Vec<(u32, u32)> = Vec::new();
+    let mut next_index = 0;
+    let mut found = Vec::new();
+    for root in 0..count as u32 {
+        if index[root as usize] != NEW {
+            continue;
+        }
+        calls.push((root, 0));
+        while let Some((variable, at)) = calls.last_mut() {
+            let v = *variable as usize;
+            if *at == 0 && index[v] == NEW {
+                index[v] = next_index;
+                low[v] = next_index;
+                next_index += 1;
+                stack.push(*variable);
+                on_stack[v] = true;
+            }
+            if let Some(&next) = follows.of(v).get(*at as usize) {
+                *at += 1;
+                let w = next as usize;
+                if index[w] == NEW {
+                    calls.push((next, 0));
+                } else if on_stack[w] {
+                    low[v] = low[v].min(index[w]);
+                }
+                continue;
+            }
+            calls.pop();
+            if let Some(&(parent, _)) = calls.last() {
+                low[parent as usize] = low[parent as usize].min(low[v]);
+            }
+            if low[v] == index[v] {
+                let mut component = Vec::new();
+                while let Some(w) = stack.pop() {
+                    on_stack[w as usize] = false;
+                    component.push(w);
+                    if w as usize == v {
+                        break;
+                    }
+                }
+                if component.len() > 1 || follows.of(v).contains(&(v as u32)) {
+                    component.sort_unstable();
+                    found.push(component);
+                }
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn loops(graph: &BondGraph, causality: &Causality, follows: &Follows) -> Vec<AlgebraicLoop> {
+    let bonds = graph.bonds.len();
+    let mut inside = vec![false; follows.starts.len()];
+    components(follows)
+        .into_iter()
+        .map(|component| {
+            for &variable in &component {
+                inside[variable as usize] = true;
+            }
+            let is_junction = |v: VertexId| matches!(graph.vertex(v).law, Law::Zero | Law::One);
+            let is_two_port =
+                |v: VertexId| matches!(graph.vertex(v).law, Law::Transformer(_) | Law::Gyrator(_));
+            let setter_of = |variable: u32| {
+                let power = if variable.is_multiple_of(2) { Power::Effort } else { Power::Flow };
+                let bond = BondId(variable / 2);
+                setter(graph, causality, bond, power).map(|end| end.vertex)
+            };
+            let of_bonds = component.iter().copied().filter(|&v| (v as usize) < 2 * bonds);
+            let mut setters: Vec<VertexId> = of_bonds.filter_map(setter_of).collect();
+            setters.sort_unstable();
+            setters.dedup();
+            let mut elements: Vec<VertexId> =
+                setters.iter().copied().filter(|&v| !is_junction(v) && !is_two_port(v)).collect();
+            if elements.is_empty() {
+                elements = setters.iter().copied().filter(|&v| is_two_port(v)).collect();
+            }
+            let signals = component
+                .iter()
+                .filter_map(|&v| v.checked_sub(2 * bonds as u32).map(SignalId))
+                .collect();
+            // Along the path, from the first element's variable backwards through what it follows from.
+            let start = component
+                .iter()
+                .copied()
+                .find(|&v| {
+                    (v as usize) < 2 * bonds
+                        && elements.first().is_some_and(|&e| setter_of(v) == Some(e))
+                })
+                .or(component.first().copied());
+            let mut path = Vec::new();
+            let mut stack: Vec<u32> = start.into_iter().collect();
+            while let Some(variable) = stack.pop() {
+                if !std::mem::take(&mut inside[variable as usize]) {
+                    continue;
+                }
+                if (variable as usize) < 2 * bonds {
+                    path.push(BondId(variable / 2));
+                }
+                stack.extend(
+                    follows
+                        .of(variable as usize)
+                        .iter()
+                        .rev()
+                        .copied()
+                        .filter(|&next| inside[next as usize]),
+                );
+            }
+            let mut listed = std::collections::HashSet::new();
+            path.retain(|&bond| listed.insert(bond));
+            AlgebraicLoop { elements, signals, path }
+        })
+        .collect()
+}
+
+fn dependent(graph: &BondGraph, causality: &Causality, follows: &Follows) -> Vec<Dependent> {
+    let mut left = MOST_BONDS;
+    let mut reached_from = vec![u32::MAX; follows.starts.len()];
+    let mut result = Vec::new();
+    for storage in graph.vertex_ids() {
+        let kind = match &graph.vertex(storage).law {
+            Law::Store { kind, .. } | Law::Rate { kind, .. } => *kind,
+            _ => continue,
+        };
+        if is_integral(graph, causality, storage, kind) != Some(false) {
+            continue;
+        }
+        let Some(&bond) = graph.vertex(storage).bonds.first() else { continue };
+        // Backwards from what is imposed on it.
+        let start = number(bond, kind.gives());
+        let mut touched = vec![start];
+        let mut queue = VecDeque::from([start]);
+        reached_from[start as usize] = start;
+        let (mut on, mut path) = (Vec::new(), Vec::new());
+        while let Some(variable) = queue.pop_front().filter(|_| left > 0) {
+            left -= 1;
+            if (variable as usize) < 2 * graph.bonds.len() {
+                let power = if variable.is_multiple_of(2) { Power::Effort } else { Power::Flow };
+                let end = setter(graph, causality, BondId(variable / 2), power);
+                if let Some(end) = end.filter(|end| determines(graph, causality, end.vertex)) {
+                    if on.is_empty() {
+                        path = back(&reached_from, variable);
+                    }
+                    if !on.contains(&end.vertex) {
+                        on.push(end.vertex);
+                    }
+                }
+            }
+            for &next in follows.of(variable as usize) {
+                if reached_from[next as usize] == u32::MAX {
+                    reached_from[next as usize] = variable;
+                    touched.push(next);
+                    queue.push_back(next);
+                }
+            }
+        }
+        for variable in touched {
+            reached_from[variable as usize] = u32::MAX;
+        }
+        let bonds = path.into_iter().filter(|&v| (v as usize) < 2 * graph.bonds.len());
+        let mut path: Vec<BondId> = bonds.map(|v| BondId(v / 2)).collect();
+        path.dedup();
+        result.push(Dependent { storage, on, path });
+    }
+    result
+}
+
+/// A source, or a storage in integral causality.
+fn determines(graph: &BondGraph, causality: &Causality, vertex: VertexId) -> bool {
+    match &graph.vertex(vertex).law {
+        Law::Source { .. } => true,
+        Law::Store { kind, .. } | Law::Rate { kind, .. } => {
+            is_integral(graph, causality, vertex, *kind) == Some(true)
+        }
+        _ => false,
+    }
+}
+
+/// The variables from `variable` to where the search began.
+fn back(reached_from: &[u32], variable: u32) -> Vec<u32> {
+    let mut path = vec![variable];
+    let mut at = variable;
+    while reached_from[at as usize] != at {
+        at = reached_from[at as usize];
+        path.push(at);
+    }
+    path
+}

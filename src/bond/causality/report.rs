@@ -1,0 +1,379 @@
+//! Causality in words: diagnostics, the text of `bondspice causality`, and its JSON.
+
+use super::super::graph::*;
+use super::{AlgebraicLoop, Causality, Conflict, Dependent, assign};
+use crate::diagnostic::Diagnostic;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// Bonds that are labelled one by one in a message.
+const MOST: usize = 12;
+
+/// Tells what was found.
+pub fn explain(
+    graph: &BondGraph,
+    causality: &Causality,
+    rings: &[Vec<BondId>],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    for conflict in &causality.conflicts {
+        diagnostics.push(tell_conflict(graph, conflict));
+    }
+    for ring in rings {
+        diagnostics.push(tell_ring(graph, ring));
+    }
+    for dependent in &causality.dependent {
+        diagnostics.push(tell_dependent(graph, causality, dependent));
+    }
+    for found in &causality.loops {
+        diagnostics.push(tell_loop(graph, found));
+    }
+    for id in graph.vertex_ids() {
+        let vertex = graph.vertex(id);
+        let Some(&bond) = vertex.bonds.first() else { continue };
+        let Some(receives) = causality.receives_effort(graph, bond, End { vertex: id, port: 0 })
+        else {
+            continue;
+        };
+        if assign::non_dividing(vertex).is_some_and(|wanted| wanted != receives) {
+            let message = format!(
+                "{} is forced into the causality that divides by its modulus",
+                name(graph, id)
+            );
+            diagnostics.push(
+                Diagnostic::warning("W0403", vertex.span, message)
+                    .because(
+                        "its equations are kept as written and are singular where the modulus is 0",
+                    )
+                    .help("let a storage or a resistance stand between it and what forces it"),
+            );
+        }
+        let other_way = match &vertex.law {
+            Law::Dissipator(Dissipation::Effort(_)) if receives => Some(("e", "f")),
+            Law::Dissipator(Dissipation::Flow(_)) if !receives => Some(("f", "e")),
+            _ => None,
+        };
+        if let Some((gives, takes)) = other_way {
+            let message = format!(
+                "the law of {} gives {gives} from {takes}, but the graph wants {takes} from {gives}",
+                name(graph, id)
+            );
+            diagnostics.push(
+                Diagnostic::note("N0401", vertex.span, message)
+                    .because("the law stays as it is written, as an implicit equation"),
+            );
+        }
+    }
+}
+
+fn name(graph: &BondGraph, id: VertexId) -> String {
+    let vertex = graph.vertex(id);
+    format!("{}:{}", vertex.kind, vertex.name)
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [some @ .., last] => format!("{} and {last}", some.join(", ")),
+    }
+}
+
+fn names(graph: &BondGraph, ids: &[VertexId]) -> String {
+    list(&ids.iter().map(|&id| name(graph, id)).collect::<Vec<_>>())
+}
+
+/// Bonds one after the other: `a -> b -> c` as far as they hang together, else with commas.
+fn path(graph: &BondGraph, bonds: &[BondId]) -> String {
+    let mut text = String::new();
+    let mut last = None;
+    for &id in bonds {
+        let bond = graph.bond(id);
+        if last == Some(bond.from.vertex) {
+            let _ = write!(text, " -> {}", graph.vertex(bond.to.vertex).name);
+        } else {
+            let comma = if text.is_empty() { "" } else { ", " };
+            let _ = write!(text, "{comma}{}", graph.bond_name(id));
+        }
+        last = Some(bond.to.vertex);
+    }
+    text
+}
+
+fn label_path(graph: &BondGraph, bonds: &[BondId], mut diagnostic: Diagnostic) -> Diagnostic {
+    for &bond in bonds.iter().take(MOST) {
+        diagnostic = diagnostic.label(graph.bond(bond).span, "");
+    }
+    diagnostic
+}
+
+fn tell_conflict(graph: &BondGraph, conflict: &Conflict) -> Diagnostic {
+    let at = graph.vertex(conflict.at);
+    let who = names(graph, &conflict.elements);
+    let place = name(graph, conflict.at);
+    let several = conflict.elements.len() > 1;
+    let both = if conflict.elements.len() == 2 { "both" } else { "all" };
+    let sets = |power: Power| {
+        conflict
+            .elements
+            .iter()
+            .all(|&id| matches!(graph.vertex(id).law, Law::Source { sets, .. } if sets == power))
+    };
+    let (what, help) = match &at.law {
+        Law::Zero if sets(Power::Flow) && several => (
+            format!("{who} {both} impose flows on {place}, and nothing imposes its effort"),
+            "join a C, an R or an effort source to it, or take one flow source away",
+        ),
+        Law::One if sets(Power::Effort) && several => (
+            format!("{who} {both} impose efforts on {place}, and nothing imposes its flow"),
+            "join an I, an R or a flow source to it, or take one effort source away",
+        ),
+        Law::Zero if several => (
+            format!("{who} {both} impose the effort of {place}"),
+            "take one away, or put an R in series with it on a 1-junction",
+        ),
+        Law::One if several => (
+            format!("{who} {both} impose the flow of {place}"),
+            "take one away, or put an R in parallel with it on a 0-junction",
+        ),
+        Law::Transformer(_) | Law::Gyrator(_) if several => (
+            format!("{who} impose what excludes each other on the two ports of {place}"),
+            "a transformer passes effort one way and flow the other, a gyrator turns one into the other",
+        ),
+        Law::Source { .. } | Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_)
+            if !several =>
+        {
+            (
+                format!("no causality fits at {place}: what {who} imposes comes back to it"),
+                "the junctions or two-ports around it form a loop that determines a variable twice",
+            )
+        }
+        _ => (
+            format!("{who} impose different causalities along the bonds between them"),
+            "leave the causal stroke out, or put it at the other end",
+        ),
+    };
+    let message = format!("causal conflict: {what}");
+    let drawn = conflict.path.iter().any(|&bond| graph.bond(bond).given.is_some());
+    let code = if drawn { "E0407" } else { "E0406" };
+    let first = conflict.elements.first().map_or(at.span, |&id| graph.vertex(id).span);
+    let mut diagnostic = Diagnostic::error(code, first, message);
+    for &id in conflict.elements.iter().skip(1).take(MOST) {
+        diagnostic = diagnostic.label(graph.vertex(id).span, "");
+    }
+    if !conflict.path.is_empty() {
+        diagnostic =
+            diagnostic.because(format!("bonds between them: {}", path(graph, &conflict.path)));
+    }
+    if drawn {
+        diagnostic = diagnostic.because("a causal stroke is drawn on one of these bonds");
+    }
+    label_path(graph, &conflict.path, diagnostic.help(help))
+}
+
+fn tell_ring(graph: &BondGraph, ring: &[BondId]) -> Diagnostic {
+    let first = ring.first().copied();
+    let zero = first
+        .is_some_and(|bond| matches!(graph.vertex(graph.bond(bond).from.vertex).law, Law::Zero));
+    let (kind, what) = if zero { ("0", "flow") } else { ("1", "effort") };
+    let span = first.map_or(crate::source::Span::NONE, |bond| graph.bond(bond).span);
+    let message = format!(
+        "the {what} round a ring of {kind}-junctions is not determined: {} closes it",
+        path(graph, ring)
+    );
+    Diagnostic::warning("W0405", span, message)
+        .because(format!(
+            "all of them share one {}, so any {what} may circulate",
+            if zero { "effort" } else { "flow" }
+        ))
+        .help("leave this bond out: the junctions are joined without it")
+}
+
+fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependent) -> Diagnostic {
+    let vertex = graph.vertex(dependent.storage);
+    let on = &dependent.on[..dependent.on.len().min(MOST)];
+    let message = match on {
+        [] => format!("{} is in derivative causality", name(graph, dependent.storage)),
+        on => format!(
+            "{} is in derivative causality: {} determine{} it",
+            name(graph, dependent.storage),
+            names(graph, on),
+            if on.len() == 1 { "s" } else { "" }
+        ),
+    };
+    let mut diagnostic = Diagnostic::warning("W0401", vertex.span, message);
+    if !dependent.path.is_empty() {
+        diagnostic = diagnostic.because(format!("causal path: {}", path(graph, &dependent.path)));
+    }
+    for &id in on {
+        diagnostic = diagnostic.label(graph.vertex(id).span, "");
+    }
+    let (states, storages) =
+        (causality.states.len(), causality.states.len() + causality.dependent.len());
+    diagnostic
+        .because(format!("{storages} storages, {states} of them states"))
+        .help("the result is right as it stands; a stiff C or a small R between them would make it a state of its own")
+}
+
+fn tell_loop(graph: &BondGraph, found: &AlgebraicLoop) -> Diagnostic {
+    let mut members: Vec<String> = found.elements.iter().map(|&id| name(graph, id)).collect();
+    let signals = found.signals.iter().map(|&id| &graph.signals[id.index()]);
+    members.extend(signals.map(|signal| format!("signal {}", signal.name)));
+    let members = list(&members);
+    let spans = found.elements.iter().map(|&id| graph.vertex(id).span);
+    let spans = spans.chain(found.signals.iter().map(|&id| graph.signals[id.index()].span));
+    let spans: Vec<_> = spans.take(MOST).collect();
+    let span = spans.first().copied().unwrap_or(crate::source::Span::NONE);
+    if found.path.is_empty() {
+        let message = format!("{members} depend on each other at the same instant");
+        let mut diagnostic = Diagnostic::error("E0408", span, message)
+            .because("a loop of signals alone has no storage that would give it a beginning")
+            .help("let the loop pass through `integ`, `lag`, `delay` or a bond");
+        for &span in spans.iter().skip(1) {
+            diagnostic = diagnostic.label(span, "");
+        }
+        return diagnostic;
+    }
+    let mut diagnostic = Diagnostic::warning(
+        "W0402",
+        span,
+        format!("algebraic loop: {members} determine each other"),
+    );
+    for &span in spans.iter().skip(1) {
+        diagnostic = diagnostic.label(span, "");
+    }
+    diagnostic.because(format!("causal path: {}", path(graph, &found.path))).because(
+        "no storage stands between them: the solver finds their values together at each instant",
+    )
+}
+
+/// The text of `bondspice causality`.
+pub fn to_text(graph: &BondGraph, causality: &Causality) -> String {
+    let mut text =
+        String::from("bonds (the stroke is at the end on which the effort is imposed)\n");
+    for id in graph.bond_ids() {
+        let bond = graph.bond(id);
+        let arrow = match causality.strokes.get(id.index()).copied().flatten() {
+            Some(Stroke::AtFrom) => "|-> ",
+            Some(Stroke::AtTo) => "->| ",
+            None => "->  ",
+        };
+        let (from, to) = (end_name(graph, bond.from), end_name(graph, bond.to));
+        let _ = writeln!(text, "  {from} {arrow}{to}");
+    }
+    let _ = writeln!(text, "\nstates ({})", causality.states.len());
+    for &id in &causality.states {
+        let _ = writeln!(text, "  {}", name(graph, id));
+    }
+    let integrators: Vec<&Signal> =
+        graph.signals.iter().filter(|s| matches!(s.law, SignalLaw::Integrator { .. })).collect();
+    for signal in &integrators {
+        let _ = writeln!(text, "  signal {}", signal.name);
+    }
+    let _ = writeln!(
+        text,
+        "\norder {}: {} storages in integral causality, {} integrators of signals",
+        causality.order,
+        causality.states.len(),
+        integrators.len()
+    );
+    if !causality.dependent.is_empty() {
+        let _ = writeln!(text, "\nderivative causality");
+    }
+    for dependent in &causality.dependent {
+        let _ = writeln!(
+            text,
+            "  {} depends on {}: {}",
+            name(graph, dependent.storage),
+            names(graph, &dependent.on),
+            path(graph, &dependent.path)
+        );
+    }
+    if !causality.loops.is_empty() {
+        let _ = writeln!(text, "\nalgebraic loops");
+    }
+    for found in &causality.loops {
+        let mut members: Vec<String> = found.elements.iter().map(|&id| name(graph, id)).collect();
+        let signals = found.signals.iter().map(|&id| &graph.signals[id.index()]);
+        members.extend(signals.map(|signal| format!("signal {}", signal.name)));
+        let _ = writeln!(text, "  {}: {}", list(&members), path(graph, &found.path));
+    }
+    if !causality.conflicts.is_empty() {
+        let _ = writeln!(text, "\nconflicts");
+    }
+    for conflict in &causality.conflicts {
+        let _ = writeln!(
+            text,
+            "  {} at {}: {}",
+            names(graph, &conflict.elements),
+            name(graph, conflict.at),
+            path(graph, &conflict.path)
+        );
+    }
+    text
+}
+
+/// The name of a bond's end as the file would write it: a two-port's with its port.
+fn end_name(graph: &BondGraph, end: End) -> String {
+    let vertex = graph.vertex(end.vertex);
+    match vertex.law {
+        Law::Transformer(_) | Law::Gyrator(_) => format!("{}.{}", vertex.name, end.port + 1),
+        _ => vertex.name.clone(),
+    }
+}
+
+/// The JSON of `bondspice causality --format json`. A bond's `stroke` is `"from"`, `"to"` or null; paths are bonds as
+/// `[from, to]`.
+pub fn to_json(graph: &BondGraph, causality: &Causality) -> Value {
+    let vertices = |ids: &[VertexId]| -> Vec<&str> {
+        ids.iter().map(|&id| graph.vertex(id).name.as_str()).collect()
+    };
+    let bonds = |ids: &[BondId]| -> Vec<[&str; 2]> {
+        ids.iter()
+            .map(|&id| {
+                let bond = graph.bond(id);
+                [&*graph.vertex(bond.from.vertex).name, &*graph.vertex(bond.to.vertex).name]
+            })
+            .collect()
+    };
+    let stroke = |id: BondId| match causality.strokes.get(id.index()).copied().flatten() {
+        Some(Stroke::AtFrom) => json!("from"),
+        Some(Stroke::AtTo) => json!("to"),
+        None => Value::Null,
+    };
+    let integrators = graph
+        .signals
+        .iter()
+        .filter(|signal| matches!(signal.law, SignalLaw::Integrator { .. }))
+        .map(|signal| signal.name.as_str());
+    let states: Vec<&str> = vertices(&causality.states).into_iter().chain(integrators).collect();
+    json!({
+        "schema": 1,
+        "bonds": graph.bond_ids().map(|id| {
+            let bond = graph.bond(id);
+            json!({
+                "from": graph.vertex(bond.from.vertex).name,
+                "to": graph.vertex(bond.to.vertex).name,
+                "stroke": stroke(id),
+            })
+        }).collect::<Vec<_>>(),
+        "states": states,
+        "order": causality.order,
+        "derivative": causality.dependent.iter().map(|dependent| json!({
+            "storage": graph.vertex(dependent.storage).name,
+            "on": vertices(&dependent.on),
+            "path": bonds(&dependent.path),
+        })).collect::<Vec<_>>(),
+        "loops": causality.loops.iter().map(|found| json!({
+            "elements": vertices(&found.elements),
+            "signals": found.signals.iter().map(|id| graph.signals[id.index()].name.as_str()).collect::<Vec<_>>(),
+            "path": bonds(&found.path),
+        })).collect::<Vec<_>>(),
+        "conflicts": causality.conflicts.iter().map(|conflict| json!({
+            "at": graph.vertex(conflict.at).name,
+            "elements": vertices(&conflict.elements),
+            "path": bonds(&conflict.path),
+        })).collect::<Vec<_>>(),
+    })
+}
