@@ -68,6 +68,9 @@ pub const CODES: &[Code] = &[
     row("E0506", "a derivative is not determined", "A stored quantity is set by a signal, and the effort or flow that would move it is not free to do so. Let it act through an R, a C or an I."),
     row("W0510", "variables that nothing determines", "The junctions leave a variable open, such as the flow round a ring of 0-junctions. It is taken as 0 and cannot be observed in earnest; break the ring, or put an R into it."),
     // -- 06: translation
+    row("E0601", "needed flow is undetermined", "A law, a linked source or a column needs the flow of a bond in a ring of equal junctions, and the junctions leave what runs round the ring undetermined. Leave out one bond of the ring."),
+    row("E0602", "quantity is in no circuit variable", "The quantity is left undetermined by the junctions, or is no variable of its element, so that no node or current of the circuit holds it. Observe another variable."),
+    row("W0601", "ring of equal junctions", "0-junctions joined in a ring leave the flow round it undetermined, 1-junctions the effort. It is taken as 0. Leave out one bond of the ring: the junctions are one junction without it."),
     // -- 07: netlists and circuits
     row("E0750", "value is not finite", "A device's value came out infinite or as no number, mostly from a division by 0 in a parameter. The message names the device and the value."),
     row("E0751", "coupling makes no sense", "K couples two different inductors of the same sign by -1 <= k <= 1; the mutual inductance is k*sqrt(L1*L2)."),

@@ -1,6 +1,7 @@
 //! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
 
 pub mod header;
+pub mod write;
 
 use crate::expr;
 use crate::source::Span;

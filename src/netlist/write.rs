@@ -1,0 +1,328 @@
+//! Writes a netlist as text for ngspice, in the forms that other simulators read alike.
+//!
+//! Lines stay under 80 columns: a longer card goes on behind `+`, broken at blanks. Numbers carry no suffix. A card's
+//! comment stands at the end of its line where there is room, else on a line above.
+
+use super::{Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Shape, Waveform};
+use crate::expr::functions::Dialect;
+use crate::expr::print::{number, print};
+
+/// Lines are shorter than this.
+const WIDTH: usize = 80;
+/// Comments begin here where they can.
+const COMMENT: usize = 44;
+
+/// The text of a netlist.
+pub fn write(netlist: &Netlist) -> String {
+    let mut text = String::new();
+    text.push_str(&netlist.title.replace(['\n', '\r'], " "));
+    text.push('\n');
+    for (key, value) in &netlist.header {
+        text.push_str(&format!("*bondspice {key}={value}\n"));
+    }
+    cards(&mut text, &netlist.names, &netlist.cards);
+    text.push_str(".end\n");
+    text
+}
+
+/// An expression as a netlist writes it.
+pub fn expression(names: &Names, expr: &Expr) -> String {
+    print(expr, Dialect::Ngspice, &mut |leaf| match leaf {
+        Leaf::Parameter(name) => names.text(*name).to_string(),
+        Leaf::Voltage(plus, None) => format!("v({})", names.text(*plus)),
+        Leaf::Voltage(plus, Some(minus)) => {
+            format!("v({},{})", names.text(*plus), names.text(*minus))
+        }
+        Leaf::Current(device) => format!("i({})", names.text(*device)),
+        Leaf::Time => "time".to_string(),
+    })
+}
+
+fn cards(text: &mut String, names: &Names, cards: &[Card]) {
+    for card in cards {
+        match &card.kind {
+            CardKind::Comment(comment) => text.push_str(&format!("*{comment}\n")),
+            CardKind::Subcircuit(subcircuit) => {
+                let mut words = vec![".subckt".to_string(), names.text(subcircuit.name).into()];
+                words.extend(subcircuit.ports.iter().map(|port| names.text(*port).to_string()));
+                words.extend(assignments(names, &subcircuit.parameters));
+                line(text, &words, card.comment.as_deref());
+                self::cards(text, names, &subcircuit.cards);
+                line(text, &[".ends".into(), names.text(subcircuit.name).into()], None);
+            }
+            kind => line(text, &words(names, kind), card.comment.as_deref()),
+        }
+    }
+}
+
+/// The words of a card, between which a line may be broken.
+fn words(names: &Names, kind: &CardKind) -> Vec<String> {
+    let word = |text: &str| text.to_string();
+    match kind {
+        CardKind::Device(device) => device_words(names, device),
+        CardKind::Parameters(parameters) => {
+            std::iter::once(word(".param")).chain(assignments(names, parameters)).collect()
+        }
+        CardKind::Model { name, kind, parameters } => {
+            let mut words = vec![word(".model"), word(names.text(*name)), format!("{kind}(")];
+            words.extend(
+                parameters.iter().map(|(key, expr)| format!("{key}={}", value(names, expr))),
+            );
+            words.push(word(")"));
+            words
+        }
+        CardKind::Options(options) => std::iter::once(word(".options"))
+            .chain(options.iter().map(|(key, value)| format!("{key}={value}")))
+            .collect(),
+        CardKind::Initial(values) => std::iter::once(word(".ic"))
+            .chain(
+                values
+                    .iter()
+                    .map(|(node, expr)| format!("v({})={}", names.text(*node), value(names, expr))),
+            )
+            .collect(),
+        CardKind::Save { print, items } => {
+            let mut words =
+                if *print { vec![word(".print"), word("tran")] } else { vec![word(".save")] };
+            words.extend(items.iter().map(|(text, _)| text.clone()));
+            words
+        }
+        CardKind::Transient { step, stop, start, hmax, uic } => {
+            let mut words = vec![word(".tran"), value(names, step), value(names, stop)];
+            if start.is_some() || hmax.is_some() {
+                words.push(start.as_ref().map_or(word("0"), |start| value(names, start)));
+            }
+            words.extend(hmax.as_ref().map(|hmax| value(names, hmax)));
+            words.extend(uic.then(|| word("uic")));
+            words
+        }
+        CardKind::OperatingPoint => vec![word(".op")],
+        CardKind::Comment(_) | CardKind::Subcircuit(_) => vec![],
+    }
+}
+
+fn device_words(names: &Names, device: &Device) -> Vec<String> {
+    let name = |name: &Name| names.text(*name).to_string();
+    let full = name(&device.name);
+    let behavioural = full.starts_with(['B', 'b']);
+    let mut words = vec![full];
+    words.extend(device.nodes.iter().map(name));
+    let law = |key: &str, law: &Expr| {
+        let key = if behavioural { key } else { "VALUE" };
+        vec![format!("{key}={{{}}}", breakable(&expression(names, law)))]
+    };
+    let initial = |initial: &Option<Expr>| {
+        initial.as_ref().map(|initial| format!("IC={}", value(names, initial)))
+    };
+    let state = |on: &Option<bool>| on.map(|on| if on { "ON" } else { "OFF" }.to_string());
+    match &device.element {
+        Element::Resistor { value: resistance } => words.push(value(names, resistance)),
+        Element::Capacitor { value: size, initial: ic }
+        | Element::Inductor { value: size, initial: ic } => {
+            words.push(value(names, size));
+            words.extend(initial(ic));
+        }
+        Element::Mutual { inductors, coupling } => {
+            words.extend(inductors.iter().map(name));
+            words.push(value(names, coupling));
+        }
+        Element::VoltageSource(waveform) | Element::CurrentSource(waveform) => match waveform {
+            Waveform::Constant(constant) => words.push(value(names, constant)),
+            Waveform::Function { shape, arguments } => {
+                let shape = match shape {
+                    Shape::Pulse => "PULSE",
+                    Shape::Sin => "SIN",
+                    Shape::Pwl => "PWL",
+                    Shape::Exp => "EXP",
+                    Shape::Sffm => "SFFM",
+                };
+                let mut arguments: Vec<String> =
+                    arguments.iter().map(|argument| value(names, argument)).collect();
+                match arguments.first_mut() {
+                    Some(first) => *first = format!("{shape}({first}"),
+                    None => arguments.push(format!("{shape}(")),
+                }
+                if let Some(last) = arguments.last_mut() {
+                    last.push(')');
+                }
+                words.extend(arguments);
+            }
+        },
+        Element::Vcvs { gain, control } | Element::Vccs { gain, control } => {
+            words.extend(control.iter().map(name));
+            words.push(value(names, gain));
+        }
+        Element::Cccs { gain, control } | Element::Ccvs { gain, control } => {
+            words.push(name(control));
+            words.push(value(names, gain));
+        }
+        Element::BehaviouralVoltage { law: expr } => words.extend(law("V", expr)),
+        Element::BehaviouralCurrent { law: expr } => words.extend(law("I", expr)),
+        Element::Switch { model, control, on } => {
+            words.extend(control.iter().map(name));
+            words.push(name(model));
+            words.extend(state(on));
+        }
+        Element::CurrentSwitch { model, control, on } => {
+            words.extend([name(control), name(model)]);
+            words.extend(state(on));
+        }
+        Element::Diode { model, area } => {
+            words.push(name(model));
+            words.extend(area.as_ref().map(|area| value(names, area)));
+        }
+        Element::Instance { subcircuit, parameters } => {
+            words.push(name(subcircuit));
+            words.extend(assignments(names, parameters));
+        }
+    }
+    words
+}
+
+fn assignments(names: &Names, parameters: &[(Name, Expr)]) -> Vec<String> {
+    parameters
+        .iter()
+        .map(|(name, expr)| format!("{}={}", names.text(*name), value(names, expr)))
+        .collect()
+}
+
+/// A number as it is, anything else in braces.
+fn value(names: &Names, expr: &Expr) -> String {
+    match expr.as_number() {
+        Some(value) => number(value),
+        None => format!("{{{}}}", expression(names, expr)),
+    }
+}
+
+/// Stands in a word where a line may be broken without a blank.
+const BREAK: char = '\u{1}';
+
+/// An expression with breaks behind its operators.
+fn breakable(text: &str) -> String {
+    let mut marked = String::with_capacity(text.len() + 8);
+    let mut before = ['\0'; 2];
+    // v(a,b) stays whole.
+    let mut voltage = false;
+    for letter in text.chars() {
+        marked.push(letter);
+        let exponent = before[1].eq_ignore_ascii_case(&'e')
+            && (before[0].is_ascii_digit() || before[0] == '.');
+        match letter {
+            '(' => voltage = before[1] == 'v' && !before[0].is_alphanumeric(),
+            ')' => voltage = false,
+            _ => {}
+        }
+        if matches!(letter, '*' | '/')
+            || (letter == ',' && !voltage)
+            || (matches!(letter, '+' | '-') && !exponent)
+        {
+            marked.push(BREAK);
+        }
+        before = [before[1], letter];
+    }
+    marked
+}
+
+/// Adds a card of words, broken into lines, with its comment.
+fn line(text: &mut String, words: &[String], comment: Option<&str>) {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in words.iter().flat_map(|word| word.split(' ')) {
+        for (index, piece) in word.split(BREAK).enumerate() {
+            let Some(last) = lines.last_mut() else { continue };
+            let blank = usize::from(index == 0 && !last.is_empty());
+            if last.is_empty() || last.len() + blank + piece.len() < WIDTH {
+                last.extend(std::iter::repeat_n(' ', blank));
+                last.push_str(piece);
+            } else {
+                lines.push(format!("+ {piece}"));
+            }
+        }
+    }
+    let comment = comment.map(|comment| comment.replace(['\n', '\r'], " "));
+    match (comment, lines.as_mut_slice()) {
+        (None, _) => {}
+        (Some(comment), [only]) if only.len() + 3 + comment.chars().count() < WIDTH => {
+            let column = COMMENT.min(WIDTH - 3 - comment.chars().count());
+            *only = format!("{only:<column$} ; {comment}");
+        }
+        (Some(comment), _) => text.push_str(&format!("* {comment}\n")),
+    }
+    for line in lines {
+        text.push_str(&line);
+        text.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::Span;
+
+    fn number(value: f64) -> Expr {
+        Expr::number(value)
+    }
+
+    fn netlist() -> Netlist {
+        let mut names = Names::default();
+        let [a, b, r, v, e, p] = ["a", "b", "R_1", "V_1", "E_1", "Rload"].map(|n| names.intern(n));
+        let ground = names.intern("0");
+        let device = |name, nodes: [Name; 2], element, comment: &str| Card {
+            kind: CardKind::Device(Device { name, nodes: nodes.to_vec(), element }),
+            span: Span::NONE,
+            comment: (!comment.is_empty()).then(|| comment.to_string()),
+        };
+        let voltage = Expr::leaf(Leaf::Voltage(a, Some(b)));
+        let term = voltage.binary(crate::expr::Binary::Multiply, Expr::leaf(Leaf::Current(v)));
+        let law =
+            (0..9).fold(number(1.0), |sum, _| sum.binary(crate::expr::Binary::Add, term.clone()));
+        Netlist {
+            title: "a test".into(),
+            header: vec![("hmax".into(), "auto".into())],
+            cards: vec![
+                Card {
+                    kind: CardKind::Parameters(vec![(p, number(5e-12))]),
+                    span: Span::NONE,
+                    comment: Some("x.bg:1 load".into()),
+                },
+                device(
+                    v,
+                    [a, ground],
+                    Element::VoltageSource(Waveform::Function {
+                        shape: Shape::Pwl,
+                        arguments: vec![number(0.0), number(1.0)],
+                    }),
+                    "",
+                ),
+                device(
+                    r,
+                    [a, b],
+                    Element::Resistor { value: Expr::leaf(Leaf::Parameter(p)) },
+                    "x.bg:2 R:1",
+                ),
+                device(e, [b, ground], Element::BehaviouralVoltage { law }, "x.bg:3 R:2"),
+                Card {
+                    kind: CardKind::Transient {
+                        step: number(1e-3),
+                        stop: number(1.0),
+                        start: None,
+                        hmax: Some(number(1e-4)),
+                        uic: true,
+                    },
+                    span: Span::NONE,
+                    comment: None,
+                },
+            ],
+            names,
+        }
+    }
+
+    #[test]
+    fn cards_as_an_engineer_writes_them() {
+        insta::assert_snapshot!(write(&netlist()));
+    }
+
+    #[test]
+    fn lines_are_short() {
+        assert!(write(&netlist()).lines().all(|line| line.chars().count() < WIDTH));
+    }
+}

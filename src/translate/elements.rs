@@ -1,0 +1,401 @@
+//! Cards of elements, island by island.
+
+use super::Builder;
+use super::flows::{Carrier, own_device};
+use super::forms::{Form, Integrator, SourceValue, expressions};
+use super::map::Link;
+use super::names::Namer;
+use super::series_parallel::Item;
+use super::values::{Speaker, Unreadable, negate, product};
+use crate::bond::graph::{BondGraph, BondId, End, Leaf, SignalLaw, Variable, VertexId};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Node;
+use crate::netlist::{self, Element, Expr, Name, Waveform};
+
+/// By vertex in rate form whose q or p is spoken of: an integrator that counts it.
+pub fn counters(graph: &BondGraph, forms: &[Form], namer: &mut Namer) -> Vec<Option<Integrator>> {
+    let mut spoken = vec![false; graph.vertices.len()];
+    let mut note = |expr: &crate::bond::graph::Expr, own: Option<VertexId>| {
+        expr.leaves(&mut |leaf, _| match (leaf, own) {
+            (Leaf::Stored(id), _) => spoken[id.index()] = true,
+            (Leaf::Own(Variable::Stored), Some(id)) => spoken[id.index()] = true,
+            _ => {}
+        });
+    };
+    for id in graph.vertex_ids() {
+        if let Some(expr) = expressions(&graph.vertex(id).law) {
+            note(expr, Some(id));
+        }
+    }
+    for signal in &graph.signals {
+        if let SignalLaw::Algebraic(expr) | SignalLaw::Integrator { rate: expr, .. } = &signal.law {
+            note(expr, None);
+        }
+    }
+    for observation in &graph.experiment.observe {
+        note(&observation.expr, None);
+    }
+    let mut counter = |vertex: usize, variable: &str, feed: char| {
+        let full = format!("{}_{variable}", graph.vertices[vertex].name);
+        Integrator {
+            node: namer.node(&full),
+            capacitor: namer.device('C', &full),
+            feed: namer.device(feed, &full),
+        }
+    };
+    (0..forms.len())
+        .map(|vertex| match forms[vertex] {
+            Form::RateEffort { .. } if spoken[vertex] => Some(counter(vertex, "q", 'F')),
+            Form::RateFlow { .. } if spoken[vertex] => Some(counter(vertex, "p", 'G')),
+            _ => None,
+        })
+        .collect()
+}
+
+impl Builder<'_> {
+    /// Ground.
+    pub fn ground(&self) -> Name {
+        self.points[0]
+    }
+
+    /// Adds the cards of every island, each under a heading.
+    pub(super) fn island_cards(&mut self, diagnostics: &mut Vec<Diagnostic>) {
+        for index in 0..self.islands.len() {
+            let items = self.drawing.items[index].clone();
+            if items.is_empty() {
+                continue;
+            }
+            let heading = self.heading(index);
+            self.comment(heading);
+            for item in items {
+                match item {
+                    Item::Port(end) => {
+                        if let Err(unreadable) = self.port_card(end) {
+                            diagnostics.push(unreadable.diagnostic(self.graph));
+                        }
+                    }
+                    Item::Sense { bond, plus, minus } => self.sense_card(bond, [plus, minus]),
+                    Item::Coupler(bond) => self.coupler_cards(bond),
+                }
+            }
+        }
+    }
+
+    /// ` armature: electrical`.
+    fn heading(&self, index: usize) -> String {
+        let island = &self.islands[index];
+        let name = match (island.junctions.first(), island.bonds.first()) {
+            (Some(junction), _) => self.graph.vertex(*junction).name.clone(),
+            (None, Some(bond)) => {
+                let bond = self.graph.bond(*bond);
+                let one_port = |end: End| self.graph.vertex(end.vertex).bonds.len() == 1;
+                let end = if one_port(bond.from) { bond.from } else { bond.to };
+                self.graph.vertex(end.vertex).name.clone()
+            }
+            (None, None) => String::new(),
+        };
+        match island.domain {
+            crate::quantity::Domain::Any => format!(" {name}"),
+            domain => format!(" {name}: {}", domain.name()),
+        }
+    }
+
+    fn sense_card(&mut self, bond: BondId, points: [usize; 2]) {
+        let sense = self.flows.senses.iter().find(|sense| sense.bond == bond).map(|s| s.device);
+        if let Some(device) = sense {
+            let nodes = points.map(|point| self.node(point));
+            let what = format!("0 V, carries f({})", self.graph.bond_name(bond));
+            let span = self.graph.bond(bond).span;
+            let value = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)));
+            self.device(device, nodes, value, span, &what);
+        }
+    }
+
+    /// e and f of a bond that closes a loop of junctions, carried from its tail to its head.
+    fn coupler_cards(&mut self, bond: BondId) {
+        let [Some(from), Some(to)] = self.drawing.ends[bond.index()] else { return };
+        let (from, to) = (self.nodes(from), self.nodes(to));
+        let span = self.graph.bond(bond).span;
+        let what = format!("1:1 coupler, closes the loop at {}", self.graph.bond_name(bond));
+        let name = format!(
+            "{}_{}",
+            self.graph.vertex(self.graph.bond(bond).from.vertex).name,
+            self.graph.vertex(self.graph.bond(bond).to.vertex).name
+        );
+        let effort = self.namer.device('E', &name);
+        let flow = self.namer.device('F', &name);
+        let one = || Expr::number(1.0);
+        self.device(effort, to, Element::Vcvs { gain: one(), control: from }, span, &what);
+        // The current of E runs into the head's +, against the half arrow.
+        let follow = Element::Cccs { gain: negate(one()), control: effort };
+        self.device(flow, from, follow, span, &what);
+        self.couplers += 1;
+    }
+
+    /// The cards of an element at one of its ports.
+    fn port_card(&mut self, end: End) -> Result<(), Unreadable> {
+        let (id, port) = (end.vertex, end.port as usize);
+        let graph = self.graph;
+        let vertex = graph.vertex(id);
+        let what = format!("{}:{}", vertex.kind, vertex.name);
+        let span = vertex.span;
+        let (Some(nodes), Some(bond)) = (self.port(id, port), vertex.bonds.get(port).copied())
+        else {
+            return Ok(());
+        };
+        let form = self.forms[id.index()].clone();
+        let except = own_device(&form);
+        let law = |builder: &Self, law| builder.value(law, Some(id), Speaker::Card { except });
+        let from_here = graph.bond(bond).from == end;
+        let first = self.cards.len();
+        match &form {
+            Form::Junction | Form::Open => {}
+            Form::Short { device } => {
+                let value = Waveform::Constant(Expr::number(0.0));
+                self.device(*device, nodes, Element::VoltageSource(value), span, &what);
+            }
+            Form::EffortSource { device, value } => {
+                let element = match value {
+                    SourceValue::Constant(value) => {
+                        Element::VoltageSource(Waveform::Constant(self.constant(value)))
+                    }
+                    SourceValue::Waveform(signal) => {
+                        Element::VoltageSource(self.waveform(*signal, *device))
+                    }
+                    SourceValue::Copy(signal) => self.copy_of(*signal, true),
+                    SourceValue::Law(expr) => Element::BehaviouralVoltage { law: law(self, expr)? },
+                };
+                self.device(*device, nodes, element, span, &what);
+            }
+            Form::FlowSource { device, value } => {
+                // The source's current runs along the half arrow: out of + when the arrow leaves the element.
+                let nodes = if from_here { [nodes[1], nodes[0]] } else { nodes };
+                let element = match value {
+                    SourceValue::Constant(value) => {
+                        Element::CurrentSource(Waveform::Constant(self.constant(value)))
+                    }
+                    SourceValue::Waveform(signal) => {
+                        Element::CurrentSource(self.waveform(*signal, *device))
+                    }
+                    SourceValue::Copy(signal) => self.copy_of(*signal, false),
+                    SourceValue::Law(expr) => Element::BehaviouralCurrent { law: law(self, expr)? },
+                };
+                self.device(*device, nodes, element, span, &what);
+            }
+            Form::Resistor { device, value } => {
+                let value = self.constant(value);
+                self.device(*device, nodes, Element::Resistor { value }, span, &what);
+            }
+            Form::EffortLaw { device, law: expr } => {
+                let law = law(self, expr)?;
+                self.device(*device, nodes, Element::BehaviouralVoltage { law }, span, &what);
+            }
+            Form::FlowLaw { device, law: expr } => {
+                let law = law(self, expr)?;
+                self.device(*device, nodes, Element::BehaviouralCurrent { law }, span, &what);
+            }
+            Form::Capacitor { device, value } => {
+                let value = self.constant(value);
+                let initial = Some(Expr::number(self.initial_power(id)));
+                self.device(*device, nodes, Element::Capacitor { value, initial }, span, &what);
+            }
+            Form::Inductor { device, value } => {
+                let value = self.constant(value);
+                let initial = Some(Expr::number(self.initial_power(id)));
+                self.device(*device, nodes, Element::Inductor { value, initial }, span, &what);
+            }
+            Form::StoredEffort { device, state, law: expr } => {
+                let law = law(self, expr)?;
+                self.device(*device, nodes, Element::BehaviouralVoltage { law }, span, &what);
+                let feed = self.current(Carrier { device: *device, negated: false });
+                self.integrator(*state, feed, self.initial_stored(id), span, &what);
+            }
+            Form::StoredFlow { device, state, law: expr } => {
+                let law = law(self, expr)?;
+                self.device(*device, nodes, Element::BehaviouralCurrent { law }, span, &what);
+                self.integrator(*state, self.voltage(nodes), self.initial_stored(id), span, &what);
+            }
+            Form::ChargeLaw { device, state, law: expr } => {
+                let law = law(self, expr)?;
+                self.held_integral(*state, law, self.initial_stored(id), span, &what);
+                // The integral's source gives the capacitor its current, dq/dt, out of its own +.
+                let gain = Expr::number(-1.0);
+                let follow = Element::Cccs { gain, control: state.feed };
+                self.device(*device, nodes, follow, span, &what);
+            }
+            Form::FluxLaw { device, state, law: expr } => {
+                let law = law(self, expr)?;
+                self.held_integral(*state, law, self.initial_stored(id), span, &what);
+                let gain = Expr::number(-1.0);
+                let follow = Element::Ccvs { gain, control: state.feed };
+                self.device(*device, nodes, follow, span, &what);
+            }
+            Form::RateEffort { device, state, rate } => {
+                let control = [state.node, self.ground()];
+                let gain = Expr::number(1.0);
+                self.device(*device, nodes, Element::Vcvs { gain, control }, span, &what);
+                let rate = law(self, rate)?;
+                self.integrator(*state, rate, self.initial_power(id), span, &what);
+                if let Some(counter) = self.counters[id.index()] {
+                    let flow = self.current(Carrier { device: *device, negated: false });
+                    self.integrator(counter, flow, self.initial_stored(id), span, &what);
+                }
+            }
+            Form::RateFlow { device, state, rate } => {
+                let control = [state.node, self.ground()];
+                let gain = Expr::number(1.0);
+                self.device(*device, nodes, Element::Vccs { gain, control }, span, &what);
+                let rate = law(self, rate)?;
+                self.integrator(*state, rate, self.initial_power(id), span, &what);
+                if let Some(counter) = self.counters[id.index()] {
+                    let effort = self.voltage(nodes);
+                    self.integrator(counter, effort, self.initial_stored(id), span, &what);
+                }
+            }
+            Form::Transformer { lead, effort, flow, modulus, modulated } => {
+                let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
+                let modulus = law(self, modulus)?;
+                let what = format!("{what}.{}", port + 1);
+                let (device, element) = if port == *lead {
+                    let element = if *modulated {
+                        let law = product(modulus, self.voltage(other));
+                        Element::BehaviouralVoltage { law }
+                    } else {
+                        Element::Vcvs { gain: modulus, control: other }
+                    };
+                    (*effort, element)
+                } else {
+                    // What flows into the leading port flows out of this one, m times.
+                    let current = self.current(Carrier { device: *effort, negated: false });
+                    let element = if *modulated {
+                        let law = negate(product(modulus, current));
+                        Element::BehaviouralCurrent { law }
+                    } else {
+                        Element::Cccs { gain: negate(modulus), control: *effort }
+                    };
+                    (*flow, element)
+                };
+                self.device(device, nodes, element, span, &what);
+            }
+            Form::GyratorEfforts { devices, modulus, modulated } => {
+                // e1 = r·f2 with f2 out of port 2, e2 = r·f1 with f1 into port 1.
+                let Some(far) = vertex.bonds.get(1 - port).copied() else { return Ok(()) };
+                let speaker = Speaker::Card { except: modulated.then_some(devices[port]) };
+                let modulus = self.value(modulus, Some(id), speaker)?;
+                let outward = graph.sign_into(far, id, 1 - end.port) < 0.0;
+                let what = format!("{what}.{}", port + 1);
+                let element = if *modulated {
+                    let flow = self.inflow(id, 1 - end.port, far, speaker);
+                    let flow = flow.unwrap_or_else(|| Expr::number(f64::NAN));
+                    let law = product(modulus, flow);
+                    Element::BehaviouralVoltage { law: if port == 0 { negate(law) } else { law } }
+                } else {
+                    let Some(carrier) = self.flows.carrier(far, None) else { return Ok(()) };
+                    let negative = carrier.negated ^ outward ^ (port == 0);
+                    let gain = if negative { negate(modulus) } else { modulus };
+                    Element::Ccvs { gain, control: carrier.device }
+                };
+                self.device(devices[port], nodes, element, span, &what);
+            }
+            Form::GyratorFlows { devices, modulus, modulated } => {
+                // f1 = g·e2 into port 1, f2 = g·e1 out of port 2.
+                let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
+                let modulus = law(self, modulus)?;
+                let modulus = if port == 1 { negate(modulus) } else { modulus };
+                let what = format!("{what}.{}", port + 1);
+                let element = if *modulated {
+                    let law = product(modulus, self.voltage(other));
+                    Element::BehaviouralCurrent { law }
+                } else {
+                    Element::Vccs { gain: modulus, control: other }
+                };
+                self.device(devices[port], nodes, element, span, &what);
+            }
+        }
+        for card in first..self.cards.len() {
+            self.links.push(Link { card, element: what.clone(), bond });
+        }
+        Ok(())
+    }
+
+    /// A node whose voltage is the integral of `rate`, from `initial`.
+    pub(super) fn integrator(
+        &mut self,
+        state: Integrator,
+        rate: Expr,
+        initial: f64,
+        span: crate::source::Span,
+        what: &str,
+    ) {
+        let nodes = [self.ground(), state.node];
+        let element =
+            linked(&rate, self.ground(), true).unwrap_or(Element::BehaviouralCurrent { law: rate });
+        self.device(state.feed, nodes, element, span, what);
+        self.farad(state, initial, span, what);
+    }
+
+    /// A node held at `law`, with 1 F whose current is the law's rate.
+    fn held_integral(
+        &mut self,
+        state: Integrator,
+        law: Expr,
+        initial: f64,
+        span: crate::source::Span,
+        what: &str,
+    ) {
+        let nodes = [state.node, self.ground()];
+        self.device(state.feed, nodes, Element::BehaviouralVoltage { law }, span, what);
+        self.farad(state, initial, span, what);
+    }
+
+    fn farad(&mut self, state: Integrator, initial: f64, span: crate::source::Span, what: &str) {
+        let nodes = [state.node, self.ground()];
+        let initial = Some(Expr::number(initial));
+        let value = Expr::number(1.0);
+        self.device(state.capacitor, nodes, Element::Capacitor { value, initial }, span, what);
+    }
+
+    fn copy_of(&self, signal: crate::bond::graph::SignalId, effort: bool) -> Element {
+        let gain = Expr::number(1.0);
+        let control = match self.signal_places[signal.index()] {
+            super::signals::Place::Node(node) => [node, self.ground()],
+            super::signals::Place::Source(vertex) => {
+                self.port(vertex, 0).unwrap_or([self.ground(); 2])
+            }
+        };
+        if effort { Element::Vcvs { gain, control } } else { Element::Vccs { gain, control } }
+    }
+
+    /// The power variable that a storage starts with.
+    fn initial_power(&self, id: VertexId) -> f64 {
+        self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.power)
+    }
+
+    fn initial_stored(&self, id: VertexId) -> f64 {
+        self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.stored)
+    }
+}
+
+/// A linear source for ± one voltage or ± one current of a voltage source; `None` for anything else.
+pub fn linked(expr: &Expr, ground: Name, current: bool) -> Option<Element> {
+    let (leaf, gain) = match &*expr.node {
+        Node::Leaf(leaf) => (leaf, 1.0),
+        Node::Unary(crate::expr::Unary::Negate, inner) => match &*inner.node {
+            Node::Leaf(leaf) => (leaf, -1.0),
+            _ => return None,
+        },
+        _ => return None,
+    };
+    let gain = Expr::number(gain);
+    Some(match (leaf, current) {
+        (netlist::Leaf::Voltage(plus, minus), true) => {
+            Element::Vccs { gain, control: [*plus, minus.unwrap_or(ground)] }
+        }
+        (netlist::Leaf::Voltage(plus, minus), false) => {
+            Element::Vcvs { gain, control: [*plus, minus.unwrap_or(ground)] }
+        }
+        (netlist::Leaf::Current(device), true) => Element::Cccs { gain, control: *device },
+        (netlist::Leaf::Current(device), false) => Element::Ccvs { gain, control: *device },
+        _ => return None,
+    })
+}

@@ -1,0 +1,284 @@
+//! The map: which circuit variable is which effort, flow, state and signal of the bond graph.
+
+use super::Builder;
+use super::names::Renamed;
+use super::values::Speaker;
+use crate::bond::graph::{BondId, Law, Power, SignalOrigin, Storage};
+use crate::netlist::write::expression;
+use crate::netlist::{CardKind, Expr, Names};
+use crate::quantity::Domain;
+
+/// The map of a translation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// The dialect whose names it uses.
+    pub dialect: &'static str,
+    /// Observed columns first, then all variables of the graph in file order.
+    pub variables: Vec<Variable>,
+    /// Devices and where they come from, in the order of the netlist.
+    pub cards: Vec<MapCard>,
+    /// Names that SPICE would not take, or not tell apart.
+    pub renamed: Vec<Renamed>,
+    /// How much circuit it took.
+    pub figures: Figures,
+}
+
+/// A variable of the bond graph in terms of the circuit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// As the bond graph calls it: `e(pump_port)`, `f(rod -> attachment)`, `q(fluid)`, a signal, a column's header.
+    pub bg: String,
+    /// Its value in SI; `None` where no variable of the circuit holds it.
+    pub expr: Option<Expr>,
+    /// The value in `unit` is `expr` times this.
+    pub factor: f64,
+    /// Its unit, empty where none is known.
+    pub unit: String,
+    /// Its domain.
+    pub domain: Domain,
+    /// Whether it is an observed column.
+    pub observed: bool,
+}
+
+/// A device and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapCard {
+    /// The device's name.
+    pub card: String,
+    /// The element, `R:eta`, or what else the card stands for.
+    pub element: String,
+    /// The bond of its port, `armature -> eta`.
+    pub bond: Option<String>,
+    /// The line of the bond graph's file.
+    pub line: Option<usize>,
+}
+
+/// How much circuit it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Figures {
+    /// Nodes without ground.
+    pub nodes: usize,
+    /// Devices.
+    pub devices: usize,
+    /// Those that stand for no element: 0 V sources that carry a flow, 1:1 couplers.
+    pub helpers: usize,
+}
+
+/// Which bond a card belongs to.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Index among the cards.
+    pub card: usize,
+    /// `R:eta`.
+    pub element: String,
+    /// The bond of its port.
+    pub bond: BondId,
+}
+
+impl Map {
+    /// The map as JSON, schema 1.
+    pub fn json(&self, names: &Names) -> serde_json::Value {
+        let variables: Vec<_> = self
+            .variables
+            .iter()
+            .map(|variable| {
+                serde_json::json!({
+                    "bg": variable.bg,
+                    "expr": variable.expr.as_ref().map(|expr| expression(names, expr)),
+                    "factor": variable.factor,
+                    "unit": variable.unit,
+                    "domain": variable.domain.name(),
+                    "observed": variable.observed,
+                })
+            })
+            .collect();
+        let cards: Vec<_> = self
+            .cards
+            .iter()
+            .map(|card| {
+                serde_json::json!({
+                    "card": card.card,
+                    "element": card.element,
+                    "bond": card.bond,
+                    "line": card.line,
+                })
+            })
+            .collect();
+        let renamed: Vec<_> = self
+            .renamed
+            .iter()
+            .map(|name| serde_json::json!({ "from": name.from, "to": name.to }))
+            .collect();
+        let Figures { nodes, devices, helpers } = self.figures;
+        serde_json::json!({
+            "schema": 1,
+            "dialect": self.dialect,
+            "scale": {},
+            "variables": variables,
+            "cards": cards,
+            "renamed": renamed,
+            "figures": { "nodes": nodes, "devices": devices, "helpers": helpers },
+        })
+    }
+}
+
+impl Builder<'_> {
+    /// The map of what has been built.
+    pub(super) fn map(&self) -> Map {
+        let mut variables = self.observed();
+        self.element_variables(&mut variables);
+        self.bond_variables(&mut variables);
+        self.signal_variables(&mut variables);
+        let cards = self.map_cards();
+        let mut nodes = std::collections::HashSet::new();
+        for card in &self.cards {
+            if let CardKind::Device(device) = &card.kind {
+                nodes.extend(device.nodes.iter().copied());
+            }
+        }
+        nodes.remove(&self.ground());
+        let figures = Figures {
+            nodes: nodes.len(),
+            devices: cards.len(),
+            helpers: self.flows.senses.len() + self.couplers,
+        };
+        let renamed = self.namer.renamed.clone();
+        Map { dialect: "ngspice", variables, cards, renamed, figures }
+    }
+
+    fn observed(&self) -> Vec<Variable> {
+        let mut variables = Vec::new();
+        for observation in &self.graph.experiment.observe {
+            // What cannot be read is said where the columns are made.
+            if let Ok(expr) = self.value(&observation.expr, None, Speaker::Output) {
+                variables.push(Variable {
+                    bg: observation.name.clone(),
+                    expr: Some(expr),
+                    factor: 1.0 / observation.unit.1,
+                    unit: match observation.unit.0.as_str() {
+                        "" => observation.si_unit.clone(),
+                        unit => unit.to_string(),
+                    },
+                    domain: Domain::Any,
+                    observed: true,
+                });
+            }
+        }
+        variables
+    }
+
+    /// Efforts of 0-junctions, flows of 1-junctions, both of every port, and what is stored.
+    fn element_variables(&self, variables: &mut Vec<Variable>) {
+        let graph = self.graph;
+        for id in graph.vertex_ids() {
+            let vertex = graph.vertex(id);
+            let name = &vertex.name;
+            let mut push = |bg: String, expr, unit: &str, domain| {
+                variables.push(Variable {
+                    bg,
+                    expr,
+                    factor: 1.0,
+                    unit: unit.to_string(),
+                    domain,
+                    observed: false,
+                });
+            };
+            let Some(first) = vertex.bonds.first().copied() else { continue };
+            let domain = graph.bond(first).domain;
+            let row = domain.row();
+            match &vertex.law {
+                Law::Zero => push(format!("e({name})"), self.effort(first), row.effort, domain),
+                Law::One => {
+                    let flow = self.flow(first, Speaker::Output);
+                    push(format!("f({name})"), flow, row.flow, domain);
+                }
+                Law::Transformer(_) | Law::Gyrator(_) => {
+                    for (port, bond) in vertex.bonds.iter().enumerate() {
+                        let domain = graph.bond(*bond).domain;
+                        let (row, port) = (domain.row(), port + 1);
+                        push(format!("e({name}.{port})"), self.effort(*bond), row.effort, domain);
+                        let flow = self.flow(*bond, Speaker::Output);
+                        push(format!("f({name}.{port})"), flow, row.flow, domain);
+                    }
+                }
+                law => {
+                    // Sources count along the half arrow, all others into the element.
+                    let flow = match law {
+                        Law::Source { detector: false, .. } => self.flow(first, Speaker::Output),
+                        _ => self.own_power(id, Power::Flow, Speaker::Output),
+                    };
+                    push(format!("e({name})"), self.effort(first), row.effort, domain);
+                    push(format!("f({name})"), flow, row.flow, domain);
+                    if let Law::Store { kind, .. } | Law::Rate { kind, .. } = law {
+                        let (letter, unit) = match kind {
+                            Storage::Compliance => ('q', row.displacement),
+                            Storage::Inertia => ('p', row.momentum),
+                        };
+                        let stored = self.stored(id, Speaker::Output);
+                        push(format!("{letter}({name})"), stored, unit, domain);
+                    }
+                }
+            }
+        }
+    }
+
+    fn bond_variables(&self, variables: &mut Vec<Variable>) {
+        let graph = self.graph;
+        let mut count = std::collections::HashMap::new();
+        for bond in graph.bond_ids() {
+            let domain = graph.bond(bond).domain;
+            let name = graph.bond_name(bond);
+            let nth = count.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
+            let name = if *nth > 1 { format!("{name} [{nth}]") } else { name };
+            for (letter, expr, unit) in [
+                ('e', self.effort(bond), domain.row().effort),
+                ('f', self.flow(bond, Speaker::Output), domain.row().flow),
+            ] {
+                variables.push(Variable {
+                    bg: format!("{letter}({name})"),
+                    expr,
+                    factor: 1.0,
+                    unit: unit.to_string(),
+                    domain,
+                    observed: false,
+                });
+            }
+        }
+    }
+
+    fn signal_variables(&self, variables: &mut Vec<Variable>) {
+        for (signal, place) in self.graph.signals.iter().zip(&self.signal_places) {
+            if signal.origin == SignalOrigin::Hidden {
+                continue;
+            }
+            let unit = signal.unit.as_ref().filter(|unit| unit.factor == 1.0);
+            variables.push(Variable {
+                bg: signal.name.clone(),
+                expr: self.signal(*place),
+                factor: 1.0,
+                unit: unit.map(|unit| unit.text.clone()).unwrap_or_default(),
+                domain: Domain::Any,
+                observed: false,
+            });
+        }
+    }
+
+    fn map_cards(&self) -> Vec<MapCard> {
+        let mut links = self.links.iter().peekable();
+        let mut cards = Vec::new();
+        for (index, card) in self.cards.iter().enumerate() {
+            let CardKind::Device(device) = &card.kind else { continue };
+            let link = links.next_if(|link| link.card == index);
+            let what = card.comment.as_deref().unwrap_or("");
+            // Past the place that the comment begins with.
+            let what = what.split_once(' ').map_or(what, |(_, what)| what);
+            cards.push(MapCard {
+                card: self.namer.names.text(device.name).to_string(),
+                element: link.map_or_else(|| what.to_string(), |link| link.element.clone()),
+                bond: link.map(|link| self.graph.bond_name(link.bond)),
+                line: self.source.position(card.span).map(|(line, _)| line),
+            });
+        }
+        cards
+    }
+}
