@@ -1,10 +1,10 @@
 //! The value of an expression, by a walk over the tree: for constants, and as the oracle of the faster ways.
 //!
-//! What each operator means is said here and in [`functions`](super::functions), once: IEEE arithmetic; comparisons
+//! What each operator means is said here and in [`values`](super::values), once: IEEE arithmetic; comparisons
 //! and logic give 1 or 0, and whatever is not 0 is true; a power is real ([`power`]).
 
-use super::functions::power;
 use super::tree::{Binary, Expr, Node, Table, Unary};
+use super::values::power;
 
 impl<L> Expr<L> {
     /// The value, given the values of its leaves. Only the chosen branch of a condition is looked at.

@@ -5,6 +5,7 @@
 //! the same model gives the same digits everywhere.
 
 use super::tree::{Binary, Expr};
+use super::values::{atan2, clamp, max, min, modulo, power_of_abs, sign, signed_power};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 /// A function that expressions may call; its row in [`FUNCTIONS`] says the rest.
@@ -207,7 +208,7 @@ pub const FUNCTIONS: &[Row] = &[
     row!(
         Atan2,
         "atan2",
-        Two(libm::atan2),
+        Two(atan2),
         |k| if k == 0 { b() } else { -a() } / (a() * a() + b() * b()),
         Expansion(atan2_by_atan)
     ),
@@ -416,76 +417,6 @@ fn atan2_by_atan() -> Template {
     either(steep, by_steep, by_flat)
 }
 
-/// −1, 0 or 1; NaN of NaN.
-pub fn sign(x: f64) -> f64 {
-    if x > 0.0 {
-        1.0
-    } else if x < 0.0 {
-        -1.0
-    } else {
-        x * 0.0
-    }
-}
-
-/// The smaller; NaN when either is.
-pub fn min(x: f64, y: f64) -> f64 {
-    if x < y || x.is_nan() { x } else { y }
-}
-
-/// The larger; NaN when either is.
-pub fn max(x: f64, y: f64) -> f64 {
-    if x > y || x.is_nan() { x } else { y }
-}
-
-fn clamp(x: f64, low: f64, high: f64) -> f64 {
-    min(max(x, low), high)
-}
-
-/// The remainder with the divisor's sign.
-fn modulo(x: f64, y: f64) -> f64 {
-    let remainder = libm::fmod(x, y);
-    if remainder != 0.0 && (remainder < 0.0) != (y < 0.0) { remainder + y } else { remainder }
-}
-
-/// The real power x^y. Whole exponents up to 64 by multiplication, ½ by the square root; a negative base needs a
-/// whole exponent, else the value is NaN.
-pub fn power(x: f64, y: f64) -> f64 {
-    if y == 2.0 {
-        return x * x;
-    }
-    if y == 0.5 {
-        return x.sqrt();
-    }
-    if y.abs() <= 64.0 && y == y.trunc() {
-        let whole = whole_power(x, y.abs() as u32);
-        return if y < 0.0 { 1.0 / whole } else { whole };
-    }
-    libm::pow(x, y)
-}
-
-fn whole_power(x: f64, mut exponent: u32) -> f64 {
-    let (mut result, mut square) = (1.0, x);
-    while exponent > 0 {
-        if exponent & 1 == 1 {
-            result *= square;
-        }
-        exponent >>= 1;
-        if exponent > 0 {
-            square *= square;
-        }
-    }
-    result
-}
-
-fn power_of_abs(x: f64, y: f64) -> f64 {
-    power(x.abs(), y)
-}
-
-fn signed_power(x: f64, y: f64) -> f64 {
-    // 0 at 0 for every y, as an odd function has it; sign·∞ would be NaN.
-    if x == 0.0 { 0.0 } else { sign(x) * power(x.abs(), y) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -573,25 +504,6 @@ mod tests {
                     prop_assert!((value - spelled).abs() <= 1e-12 * (1.0 + value.abs()), "{} at {point:?}", row.name);
                 }
             }
-        }
-    }
-
-    #[test]
-    fn powers_are_real() {
-        assert_eq!(power(-0.3, 3.0), -0.3 * (-0.3 * -0.3));
-        assert_eq!(power(-2.0, -2.0), 0.25);
-        assert_eq!(power(0.0, 0.0), 1.0);
-        assert!(power(-1.0, 0.4).is_nan());
-        assert_eq!(Function::SignedPower.row().value.at(&[-4.0, 0.5]), -2.0);
-        assert_eq!(Function::PowerOfAbs.row().value.at(&[-3.0, 3.0]), 27.0);
-        assert_eq!(Function::Mod.row().value.at(&[-1.0, 3.0]), 2.0);
-        assert_eq!(Function::Mod.row().value.at(&[1.0, -3.0]), -2.0);
-    }
-
-    #[test]
-    fn nan_is_not_hidden_by_min_and_max() {
-        for (x, y) in [(f64::NAN, 1.0), (1.0, f64::NAN)] {
-            assert!(min(x, y).is_nan() && max(x, y).is_nan());
         }
     }
 

@@ -4,10 +4,13 @@
 //! effort; a node's voltage), and going from one stage to the next is [`Expr::try_map`].
 
 pub mod tree;
+pub mod values;
 pub mod functions;
 pub mod evaluate;
+mod chains;
 pub mod parse;
 pub mod dag;
+mod derivative;
 pub mod program;
 pub mod print;
 #[cfg(test)]

@@ -339,6 +339,29 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
+    fn no_sequence_of_tokens_breaks_the_converter(
+        tokens in prop::collection::vec(
+            prop::sample::select(vec![
+                "1", "x", "(", ")", "+", "-", "*", "/", "^", "**", "<", "==", "and", "or", "not ", "if ", " then ",
+                " else ", "max(", "min(1,", "sqrt(", "form(", ",", ";", "&&", "||", "!", "?", ":", "->", "=",
+            ]),
+            1..20,
+        )
+    ) {
+        let text = tokens.concat();
+        if let Ok(mut whole) = bond::Grammar::parse(bond::Rule::whole, &text) {
+            let pair = whole.next().unwrap().into_inner().next().unwrap();
+            let mut d = vec![];
+            prop_assert_eq!(parse::expression(&mut Toy, pair, &mut d).is_none(), !d.is_empty());
+        }
+        if let Ok(mut whole) = spice::Grammar::parse(spice::Rule::whole, &text) {
+            let pair = whole.next().unwrap().into_inner().next().unwrap();
+            let mut d = vec![];
+            prop_assert_eq!(parse::expression(&mut ToySpice, pair, &mut d).is_none(), !d.is_empty());
+        }
+    }
+
+    #[test]
     fn printed_trees_read_back_the_same(expr in trees()) {
         let text = print(&expr, Dialect::Bond, &mut |name| name.clone());
         let again = parse_bond(&text).unwrap();
