@@ -310,6 +310,8 @@ pub struct Experiment {
     pub options: Vec<(String, String)>,
     /// Observed variables in order.
     pub observe: Vec<Observation>,
+    /// Inputs that nothing drives: 0, which checking and converting accept and simulating does not.
+    pub undriven: Vec<SignalId>,
 }
 
 /// One observed column.

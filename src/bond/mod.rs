@@ -1,5 +1,8 @@
 //! Bond graphs: the language, the graph, causality, and the graph's own equations.
 
+pub mod syntax;
+pub mod elaborate;
+pub mod elements;
 pub mod graph;
 pub mod causality;
 pub mod equations;

@@ -202,6 +202,9 @@ fn nearest_unit(name: &str) -> Option<String> {
         ("Wh", "W*h"),
         ("Ah", "A*h"),
     ];
+    if name.contains(['²', '³']) {
+        return Some(name.replace('²', "^2").replace('³', "^3"));
+    }
     if let Some((_, meant)) = FOREIGN.iter().find(|(wrong, _)| *wrong == name) {
         return Some(meant.to_string());
     }
@@ -323,7 +326,18 @@ pub fn scan_unit(text: &str) -> usize {
     at
 }
 
+/// The whole number that a factor is the inverse of, as 1000 for milli: dividing by it rounds once only.
+fn inverse(factor: f64) -> Option<f64> {
+    let whole = (1.0 / factor).round();
+    (factor < 1.0 && whole < 1e15 && 1.0 / whole == factor).then_some(whole)
+}
+
 impl Unit {
+    /// A number of this unit in SI: 1.7 mH is the double nearest to 0.0017.
+    pub fn to_si(&self, value: f64) -> f64 {
+        inverse(self.factor).map_or(value * self.factor, |inverse| value / inverse)
+    }
+
     /// Reads a unit; blanks are not part of one.
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         let mut reader = Reader { text, at: 0, depth: 0 };
@@ -415,10 +429,10 @@ impl Reader<'_> {
         let too_large = || UnitError::Exponent { at: start..self.at };
         let (n, d) = exponent(text).ok_or_else(too_large)?;
         let raised = dimension.power(i64::from(n), i64::from(d)).ok_or_else(too_large)?;
-        let factor = if d == 1 {
-            factor.powi(i32::from(n))
-        } else {
-            factor.powf(f64::from(n) / f64::from(d))
+        let factor = match inverse(factor) {
+            _ if d != 1 => libm::pow(factor, f64::from(n) / f64::from(d)),
+            Some(inverse) => 1.0 / inverse.powi(i32::from(n)),
+            None => factor.powi(i32::from(n)),
         };
         Ok((factor, raised))
     }

@@ -1,0 +1,64 @@
+//! From what a file says to the flat graph: names, parameters, signals, elements, bonds, and what a run does.
+//!
+//! The order is that of what needs what: names are collected first (the order of statements never matters), bonds are
+//! joined, parameters evaluated, domains follow from their units along the bonds; then laws and signals, and at last
+//! what is observed. Each step goes on after an error as far as it can.
+
+mod scope;
+mod structure;
+mod parameters;
+mod value;
+mod reading;
+mod call;
+mod signals;
+mod laws;
+mod dimensions;
+mod domains;
+mod experiment;
+mod observe;
+
+#[cfg(test)]
+mod tests;
+
+pub use experiment::require_drives;
+pub use observe::observables;
+
+use super::graph::BondGraph;
+use super::syntax::File;
+use crate::diagnostic::{Diagnostic, has_errors};
+use crate::source::SourceMap;
+
+/// What the command line says instead of the file.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// `--set`: parameters and their values, `("L", "2mH")`.
+    pub set: Vec<(String, String)>,
+    /// `--drive`: what inputs get, `x_ref = step(0.1 s, 0 mm, 20 mm)`.
+    pub drive: Vec<String>,
+    /// `--observe`: a list as in the statement, or `all`.
+    pub observe: Option<String>,
+    /// `--until`
+    pub until: Option<String>,
+    /// `--step`
+    pub step: Option<String>,
+    /// `--option`: keys and values; they come after the file's.
+    pub options: Vec<(String, String)>,
+}
+
+/// Makes the graph of a file. `None` when anything was wrong; errors in `d` of an earlier stage count too, since a
+/// statement that could not be read leaves a hole.
+pub fn elaborate(
+    file: &File,
+    map: &SourceMap,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<BondGraph> {
+    let mut scope = scope::Scope::collect(file, map, d);
+    scope.join_bonds(d);
+    scope.evaluate_parameters(&overrides.set, d);
+    scope.infer_domains();
+    scope.make_laws(d);
+    scope.make_signals(&overrides.drive, d);
+    scope.set_experiment(overrides, d);
+    (!has_errors(d)).then_some(scope.graph)
+}

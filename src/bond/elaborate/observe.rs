@@ -1,0 +1,292 @@
+//! Columns: what is observed, under which header, in which unit; and what can be.
+
+use super::dimensions::Dim;
+use super::experiment::{is_name, si_text};
+use super::reading::variable;
+use super::scope::Scope;
+use super::value::Place;
+use crate::bond::graph::*;
+use crate::bond::syntax::{Expr as Syntax, ObserveItem, parse_observe};
+use crate::diagnostic::Diagnostic;
+use crate::expr::{Expr as Tree, Node};
+use crate::quantity::Domain;
+use crate::source::Span;
+use std::collections::HashMap;
+
+impl Scope<'_> {
+    /// The columns of a run: those of the command line, else the file's, else the default ones.
+    pub fn set_observed(&mut self, given: Option<&str>, d: &mut Vec<Diagnostic>) {
+        self.note_units();
+        let before = d.len();
+        let columns = match given {
+            Some(text) => {
+                let items = parse_observe(text, Span::NONE.file, d).unwrap_or_default();
+                let columns = self.columns(items.iter(), Some(text), d);
+                for error in &mut d[before..] {
+                    error.notes.push(format!("in what is to be observed: {text}"));
+                }
+                columns
+            }
+            None => {
+                let items = std::mem::take(&mut self.observe);
+                self.columns(items.iter().copied(), None, d)
+            }
+        };
+        let nothing = columns.is_empty() && d.len() == before;
+        self.graph.experiment.observe = if nothing { self.default_columns() } else { columns };
+    }
+
+    /// Notes the units of signals that are known.
+    fn note_units(&mut self) {
+        for (signal, dim) in self.graph.signals.iter_mut().zip(&self.signal_dimensions) {
+            if let Dim::Known(dimension) = dim {
+                let text = si_text(*dimension);
+                let dimension = *dimension;
+                signal.unit = Some(crate::quantity::Unit { text, factor: 1.0, dimension });
+            }
+        }
+    }
+
+    fn columns<'i>(
+        &mut self,
+        items: impl Iterator<Item = &'i ObserveItem>,
+        given: Option<&str>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Vec<Observation> {
+        let mut columns = vec![];
+        let mut heads: HashMap<String, Span> = HashMap::new();
+        for item in items {
+            if is_name(&item.expr, "all") && !self.values.contains_key("all") {
+                let mut all = self.default_columns();
+                all.extend(observables(&self.graph));
+                for column in all {
+                    if heads.insert(column.name.clone(), item.span).is_none() {
+                        columns.push(column);
+                    }
+                }
+                continue;
+            }
+            let Some(column) = self.column(item, given, d) else { continue };
+            if let Some(first) = heads.insert(column.name.clone(), item.span) {
+                d.push(
+                    Diagnostic::error(
+                        "E0221",
+                        item.span,
+                        format!("two columns would be headed `{}`", column.name),
+                    )
+                    .says("the second one")
+                    .label(first, "the first one")
+                    .help("give one of them another name: `… as \"name\"`"),
+                );
+                continue;
+            }
+            columns.push(column);
+        }
+        columns
+    }
+
+    fn column(
+        &mut self,
+        item: &ObserveItem,
+        given: Option<&str>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Observation> {
+        let lowered = self.lower(&item.expr, Place::observed(), d);
+        let dim = self.dimension(&item.expr, None).whole();
+        let unit = match &item.unit {
+            None => (String::new(), 1.0),
+            Some((unit, span)) => {
+                if let Dim::Known(dimension) = dim
+                    && dimension != unit.dimension
+                {
+                    let si = si_text(dimension);
+                    let si = if si.is_empty() {
+                        "a pure number".to_string()
+                    } else {
+                        format!("in {si}")
+                    };
+                    d.push(
+                        Diagnostic::error(
+                            "E0303",
+                            *span,
+                            format!("`{}` is not a unit of what is observed", unit.text),
+                        )
+                        .says(format!("a unit of dimension {}", unit.dimension))
+                        .label(item.expr.span, format!("this is {si}")),
+                    );
+                    return None;
+                }
+                (unit.text.clone(), unit.factor)
+            }
+        };
+        let name = match &item.name {
+            Some(name) => name.text.clone(),
+            None => self.written(&item.expr, given),
+        };
+        let expr = lowered?;
+        let si_unit = self.si_unit(&expr, dim);
+        Some(Observation { name, expr, unit, si_unit })
+    }
+
+    /// An expression as written, without blanks and comments.
+    fn written(&self, expr: &Syntax, given: Option<&str>) -> String {
+        let Span { start, end, .. } = expr.span;
+        let text = match given {
+            Some(text) => text.get(start as usize..end as usize).unwrap_or(""),
+            None => self.map.text(expr.span),
+        };
+        let lines = text.lines().map(|line| line.split('#').next().unwrap_or(line));
+        lines.flat_map(|line| line.chars()).filter(|c| !c.is_whitespace()).collect()
+    }
+
+    fn si_unit(&self, expr: &Expr, dim: Dim) -> String {
+        let known = unit_of(&self.graph, expr);
+        match dim {
+            Dim::Known(dimension) if known.is_empty() => si_text(dimension),
+            _ => known,
+        }
+    }
+
+    /// Inputs, outputs, signals, e of 0-junctions, f of 1-junctions, q and p of storages, each in file order.
+    fn default_columns(&self) -> Vec<Observation> {
+        let mut columns: Vec<Observation> = vec![];
+        let mut add = |column: Observation| {
+            if columns.iter().all(|other| other.name != column.name) {
+                columns.push(column);
+            }
+        };
+        let signals = |origin| {
+            let all = self.graph.signals.iter().enumerate();
+            all.filter(move |(_, signal)| signal.origin == origin).map(|(k, _)| SignalId(k as u32))
+        };
+        signals(SignalOrigin::Input).for_each(|id| add(signal_column(&self.graph, id)));
+        for name in &self.outputs {
+            let id = self.graph.signals.iter().position(|signal| signal.name == name.text);
+            if let Some(id) = id {
+                add(signal_column(&self.graph, SignalId(id as u32)));
+            }
+        }
+        signals(SignalOrigin::Signal).for_each(|id| add(signal_column(&self.graph, id)));
+        for (shape, what) in [("0", "e"), ("1", "f")] {
+            for vertex in self.graph.vertices.iter().filter(|vertex| vertex.kind == shape) {
+                if let Some(bond) = vertex.bonds.first() {
+                    add(bond_column(&self.graph, &vertex.name, what, *bond, false));
+                }
+            }
+        }
+        for id in self.graph.vertex_ids() {
+            if let Some(column) = stored_column(&self.graph, id) {
+                add(column);
+            }
+        }
+        columns
+    }
+}
+
+/// Everything that can be observed by a name: inputs and signals, then the readings of every element in file order.
+pub fn observables(graph: &BondGraph) -> Vec<Observation> {
+    let mut columns = vec![];
+    for (k, signal) in graph.signals.iter().enumerate() {
+        if signal.origin != SignalOrigin::Hidden {
+            columns.push(signal_column(graph, SignalId(k as u32)));
+        }
+    }
+    for id in graph.vertex_ids() {
+        let vertex = graph.vertex(id);
+        let mut add = |name: &str, what, bond, negated| {
+            columns.push(bond_column(graph, name, what, bond, negated));
+        };
+        match (&vertex.law, vertex.bonds.as_slice()) {
+            (Law::Zero, [bond, ..]) => add(&vertex.name, "e", *bond, false),
+            (Law::One, [bond, ..]) => add(&vertex.name, "f", *bond, false),
+            (Law::Transformer(_) | Law::Gyrator(_), [first, second]) => {
+                for (port, bond) in [(1, first), (2, second)] {
+                    for what in ["e", "f", "power"] {
+                        add(&format!("{}.{port}", vertex.name), what, *bond, false);
+                    }
+                }
+            }
+            (law, [bond, ..]) => {
+                let along = matches!(law, Law::Source { detector: false, .. });
+                let negated = !along && graph.bond(*bond).from.vertex == id;
+                for what in ["e", "f", "power"] {
+                    add(&vertex.name, what, *bond, negated);
+                }
+            }
+            _ => {}
+        }
+        columns.extend(stored_column(graph, id));
+    }
+    columns
+}
+
+fn signal_column(graph: &BondGraph, id: SignalId) -> Observation {
+    let expr = Tree::leaf(Leaf::Signal(id));
+    let si_unit = unit_of(graph, &expr);
+    let name = graph.signals[id.index()].name.clone();
+    Observation { name, expr, unit: (String::new(), 1.0), si_unit }
+}
+
+fn bond_column(
+    graph: &BondGraph,
+    element: &str,
+    what: &str,
+    bond: BondId,
+    negated: bool,
+) -> Observation {
+    let expr = variable(what, bond, negated, Span::NONE);
+    let si_unit = unit_of(graph, &expr);
+    Observation { name: format!("{what}({element})"), expr, unit: (String::new(), 1.0), si_unit }
+}
+
+fn stored_column(graph: &BondGraph, id: VertexId) -> Option<Observation> {
+    let vertex = graph.vertex(id);
+    let (Law::Store { kind, .. } | Law::Rate { kind, .. }) = &vertex.law else { return None };
+    let what = if *kind == Storage::Compliance { "q" } else { "p" };
+    let expr = Tree::leaf(Leaf::Stored(id));
+    let si_unit = unit_of(graph, &expr);
+    let name = format!("{what}({})", vertex.name);
+    Some(Observation { name, expr, unit: (String::new(), 1.0), si_unit })
+}
+
+/// The SI unit of a reading or a signal alone, in its domain's words; empty when it is not known.
+fn unit_of(graph: &BondGraph, expr: &Expr) -> String {
+    match &*expr.node {
+        Node::Leaf(Leaf::Signal(id)) => {
+            let unit = &graph.signals[id.index()].unit;
+            unit.as_ref().map_or(String::new(), |unit| unit.text.clone())
+        }
+        Node::Leaf(Leaf::Bond { bond, variable, .. }) => {
+            let row = graph.bond(*bond).domain.row();
+            let text = if *variable == Power::Effort { row.effort } else { row.flow };
+            text.to_string()
+        }
+        Node::Leaf(Leaf::Stored(id)) => {
+            let vertex = graph.vertex(*id);
+            let row =
+                vertex.bonds.first().map_or(Domain::Any, |bond| graph.bond(*bond).domain).row();
+            let (Law::Store { kind, .. } | Law::Rate { kind, .. }) = &vertex.law else {
+                return String::new();
+            };
+            match kind {
+                Storage::Compliance => row.displacement.to_string(),
+                Storage::Inertia => row.momentum.to_string(),
+            }
+        }
+        Node::Binary(crate::expr::Binary::Multiply, a, b) => {
+            // The power of a bond, as a reading gives it.
+            match (&*a.node, &*b.node) {
+                (
+                    Node::Leaf(Leaf::Bond { bond, variable: Power::Effort, .. }),
+                    Node::Leaf(Leaf::Bond { bond: same, variable: Power::Flow, .. }),
+                ) if bond == same => {
+                    let domain = graph.bond(*bond).domain;
+                    let known = domain != Domain::Any && !domain.row().pseudo;
+                    if known { "W".to_string() } else { String::new() }
+                }
+                _ => String::new(),
+            }
+        }
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,225 @@
+//! Readings: e(x), f(x), q(x), p(x), power(x), and e(a -> b), f(a -> b), power(a -> b).
+
+use super::scope::Scope;
+use crate::bond::elements::Shape;
+use crate::bond::graph::*;
+use crate::bond::syntax::{Call, Path, Value};
+use crate::diagnostic::Diagnostic;
+use crate::expr::{Binary, Expr as Tree, Node};
+use crate::source::Span;
+
+/// The names of readings.
+pub(super) const READINGS: [&str; 5] = ["e", "f", "q", "p", "power"];
+
+impl Scope<'_> {
+    /// What a reading means.
+    pub fn reading(&self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Expr> {
+        let argument = match call.rows.as_slice() {
+            [row] if row.len() == 1 && row[0].label.is_none() => &row[0].value,
+            _ => {
+                d.push(self.form(call, span));
+                return None;
+            }
+        };
+        match argument {
+            Value::Bond(from, to) => self.bond_reading(call, from, to, span, d),
+            Value::Expr(expr) => match &*expr.node {
+                Node::Leaf(crate::bond::syntax::Leaf::Name(path)) => {
+                    self.element_reading(call, path, span, d)
+                }
+                _ => {
+                    d.push(self.form(call, span));
+                    None
+                }
+            },
+            _ => {
+                d.push(self.form(call, span));
+                None
+            }
+        }
+    }
+
+    fn form(&self, call: &Call, span: Span) -> Diagnostic {
+        let name = &call.name.text;
+        Diagnostic::error("E0214", span, format!("`{name}(…)` reads an element or a bond"))
+            .says("no name of one stands in the brackets")
+            .help(format!(
+                "write `{name}(shaft)` or `{name}(a -> b)`; a product needs a `*`, as in `{name}*(…)`"
+            ))
+    }
+
+    fn element_reading(
+        &self,
+        call: &Call,
+        path: &Path,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr> {
+        let id = self.vertex(path, d)?;
+        let port = self.port(id, path, d)?;
+        let declaration = self.declarations[id.index()];
+        let shape = declaration.element.shape;
+        let what = call.name.text.as_str();
+        let (name, noun) = (path.name.text.as_str(), declaration.element.noun);
+        let wrong = |message: String| {
+            Diagnostic::error("E0214", span, message)
+                .says("cannot be read")
+                .label(declaration.span, format!("`{name}` is a {noun}"))
+        };
+        if matches!(what, "q" | "p") {
+            let stored = if what == "q" { Shape::Compliance } else { Shape::Inertia };
+            if shape == stored {
+                return Some(self.stored(id, span));
+            }
+            let error = wrong(format!("a {noun} stores no `{what}`"));
+            d.push(match shape {
+                Shape::Compliance => error.help(format!("a compliance stores q: `q({name})`")),
+                Shape::Inertia => error.help(format!("an inertia stores p: `p({name})`")),
+                _ => error.help(format!(
+                    "integrate {} in a signal: `integ({}({name}))`",
+                    if what == "q" { "the flow" } else { "the effort" },
+                    if what == "q" { "f" } else { "e" },
+                )),
+            });
+            return None;
+        }
+        if shape.is_junction() {
+            let common = if shape == Shape::Zero { "e" } else { "f" };
+            if what != common {
+                let other = if what == "power" {
+                    "power"
+                } else {
+                    if what == "e" { "effort" } else { "flow" }
+                };
+                let mut error =
+                    wrong(format!("the bonds of the {noun} `{name}` have no common {other}"));
+                let bonds = &self.graph.vertex(id).bonds;
+                let listed: Vec<String> = bonds
+                    .iter()
+                    .map(|bond| format!("`{what}({})`", self.graph.bond_name(*bond)))
+                    .collect();
+                if !listed.is_empty() {
+                    error = error.help(format!("read one of its bonds: {}", listed.join(", ")));
+                }
+                d.push(error);
+                return None;
+            }
+        }
+        if shape.is_two_port() && port.is_none() {
+            d.push(
+                wrong(format!("`{name}` has two ports, which one?"))
+                    .help(format!("write `{what}({name}.1)` or `{what}({name}.2)`")),
+            );
+            return None;
+        }
+        let bonds = &self.graph.vertex(id).bonds;
+        let bond = *match port {
+            Some(port) => bonds.iter().find(|bond| {
+                let bond = self.graph.bond(**bond);
+                let end = End { vertex: id, port };
+                bond.from == end || bond.to == end
+            }),
+            None => bonds.first(),
+        }?;
+        // Elements count into themselves; junctions, two-ports and sources along the half arrow.
+        let into = !shape.is_junction()
+            && !shape.is_two_port()
+            && !matches!(shape, Shape::EffortSource | Shape::FlowSource);
+        let negated = into && self.graph.bond(bond).from.vertex == id;
+        Some(variable(what, bond, negated, span))
+    }
+
+    /// q of a compliance, p of an inertia. In rate form the charge is counted from the start, on top of what is given.
+    fn stored(&self, id: VertexId, span: Span) -> Expr {
+        Tree::new(Node::Leaf(Leaf::Stored(id)), span)
+    }
+
+    fn bond_reading(
+        &self,
+        call: &Call,
+        from: &Path,
+        to: &Path,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr> {
+        let (a, b) = (self.vertex(from, d), self.vertex(to, d));
+        let (a, b) = (a?, b?);
+        let (from_port, to_port) = (self.port(a, from, d)?, self.port(b, to, d)?);
+        let what = call.name.text.as_str();
+        if matches!(what, "q" | "p") {
+            d.push(
+                Diagnostic::error("E0214", span, format!("a bond stores no `{what}`"))
+                    .says("cannot be read")
+                    .help("read the storage: `q(name)` of a compliance, `p(name)` of an inertia"),
+            );
+            return None;
+        }
+        let joins = |bond: &BondId, x, x_port: Option<u32>, y, y_port: Option<u32>| {
+            let bond = self.graph.bond(*bond);
+            bond.from.vertex == x
+                && bond.to.vertex == y
+                && x_port.is_none_or(|port| bond.from.port == port)
+                && y_port.is_none_or(|port| bond.to.port == port)
+        };
+        let found: Vec<BondId> =
+            self.graph.bond_ids().filter(|bond| joins(bond, a, from_port, b, to_port)).collect();
+        let written = format!("{} -> {}", from.text(), to.text());
+        let missing = |message: String| Diagnostic::error("E0215", span, message);
+        match (found.as_slice(), &call.index) {
+            ([bond], None) => Some(variable(what, *bond, false, span)),
+            ([], _) => {
+                let error = missing(format!("there is no bond `{written}`")).says("no such bond");
+                let reversed =
+                    self.graph.bond_ids().any(|bond| joins(&bond, b, to_port, a, from_port));
+                d.push(if reversed {
+                    let turned = format!("{} -> {}", to.text(), from.text());
+                    error
+                        .help(format!(
+                            "its half arrow points the other way: write `{what}({turned})`"
+                        ))
+                        .fix("turn it round", vec![(from.span.join(to.span), turned)])
+                } else {
+                    error
+                });
+                None
+            }
+            (several, Some(index)) => {
+                let number = index.constant().filter(|k| *k >= 1.0 && k.fract() == 0.0);
+                let bond = number.and_then(|k| several.get(k as usize - 1));
+                if bond.is_none() {
+                    d.push(
+                        Diagnostic::error(
+                            "E0215",
+                            index.span,
+                            format!("there is no such bond among the {}", several.len()),
+                        )
+                        .says("counted from 1"),
+                    );
+                }
+                bond.map(|bond| variable(what, *bond, false, span))
+            }
+            (several, None) => {
+                d.push(
+                    missing(format!("{} bonds are `{written}`", several.len()))
+                        .says("which one?")
+                        .help(format!(
+                            "count them in the order of the file: `{what}({written})[1]`"
+                        )),
+                );
+                None
+            }
+        }
+    }
+}
+
+/// A reading of a bond: e, f or power.
+pub(super) fn variable(what: &str, bond: BondId, negated: bool, span: Span) -> Expr {
+    let effort = Leaf::Bond { bond, variable: Power::Effort, negated: false };
+    let flow = Leaf::Bond { bond, variable: Power::Flow, negated };
+    let leaf = |leaf| Tree::new(Node::Leaf(leaf), span);
+    match what {
+        "e" => leaf(effort),
+        "f" => leaf(flow),
+        _ => Tree::new(Node::Binary(Binary::Multiply, leaf(effort), leaf(flow)), span),
+    }
+}

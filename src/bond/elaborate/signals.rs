@@ -1,0 +1,496 @@
+//! Signals: their laws, the hidden ones that functions with memory bring along, and loops.
+
+use super::call::{DYNAMICS, Signature, WAVEFORMS, signature};
+use super::scope::{Meaning, Scope, did_you_mean};
+use super::value::Place;
+use crate::bond::graph::*;
+use crate::bond::syntax::{self, Call, Name, Value, parse_drive};
+use crate::diagnostic::Diagnostic;
+use crate::expr::{Expr as Tree, Function, Node};
+use crate::quantity::nearest;
+use crate::source::Span;
+
+impl Scope<'_> {
+    /// Gives every signal and input its law, and puts hidden ones before those that they belong to.
+    pub fn make_signals(&mut self, drives: &[String], d: &mut Vec<Diagnostic>) {
+        for k in 0..self.signals.len() {
+            let Some((value, statement)) = self.signals[k].as_ref().map(|s| (s.value, s.statement))
+            else {
+                continue;
+            };
+            let id = SignalId(k as u32);
+            if let Some(law) = self.signal_law(id, value, statement, d) {
+                self.graph.signals[k].law = law;
+            }
+        }
+        self.drive_inputs(drives, d);
+        self.check_outputs(d);
+        self.infer_signal_dimensions();
+        self.find_loops(d);
+        self.sort_signals();
+    }
+
+    /// The law of a signal or input from what stands after `=`.
+    fn signal_law(
+        &mut self,
+        id: SignalId,
+        value: &syntax::Expr,
+        statement: usize,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<SignalLaw> {
+        if let Node::Leaf(syntax::Leaf::Call(call)) = &*value.node {
+            let name = call.name.text.as_str();
+            if signature(WAVEFORMS, name).is_some() || signature(DYNAMICS, name).is_some() {
+                return self.signal_call(id, call, value.span, statement, d);
+            }
+        }
+        let owner = self.graph.signals[id.index()].name.clone();
+        self.lower(value, Place::free(&owner, statement), d).map(SignalLaw::Algebraic)
+    }
+
+    /// The law of a signal that is one call of a waveform or a function with memory.
+    pub fn signal_call(
+        &mut self,
+        id: SignalId,
+        call: &Call,
+        span: Span,
+        statement: usize,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<SignalLaw> {
+        let name = call.name.text.as_str();
+        if name == "pwl" {
+            return self.pwl(call, span, d).map(SignalLaw::Waveform);
+        }
+        if let Some(row) = signature(WAVEFORMS, name) {
+            return self.waveform(call, row, span, d).map(SignalLaw::Waveform);
+        }
+        let row = signature(DYNAMICS, name)?;
+        let given = self.arguments(call, row, span, d)?;
+        let owner = self.graph.signals[id.index()].name.clone();
+        let mut failed = false;
+        let mut values = vec![];
+        for (argument, value) in row.arguments.iter().zip(given) {
+            let starts = matches!(*argument, "ic" | "z0");
+            let place = if starts {
+                Place::constant("an initial value")
+            } else {
+                Place::free(&owner, statement)
+            };
+            let lowered = value.map(|value| self.lower(value, place, d));
+            failed |= matches!(lowered, Some(None));
+            values.push(lowered.flatten());
+        }
+        if failed {
+            return None;
+        }
+        let this = Tree::new(Node::Leaf(Leaf::Signal(id)), span);
+        let mut values = values.into_iter();
+        let mut next = || values.next().flatten();
+        let x = next()?;
+        Some(match name {
+            "integ" => SignalLaw::Integrator {
+                rate: x,
+                initial: Initial::Given(next().unwrap_or(Tree::number(0.0))),
+            },
+            "lag" => {
+                let tau = next()?;
+                let initial = next().map_or(Initial::Implied, Initial::Given);
+                SignalLaw::Integrator { rate: (x - this) / tau, initial }
+            }
+            _ => {
+                // u = Kp·x + z, y = clamp(u, lo, hi), z' = Ki·x + Kaw·(y − u).
+                let (kp, ki, lo, hi, kaw, z0) = (next(), next(), next(), next(), next(), next());
+                if kp.is_none() && ki.is_none() {
+                    d.push(
+                        Diagnostic::error("E0216", span, "`pi` has neither `Kp` nor `Ki`")
+                            .says("a regulator without a gain")
+                            .help("as in `pi(x, Kp = 2, Ki = 10)`"),
+                    );
+                    return None;
+                }
+                let state = ki.as_ref().map(|_| self.hide(&owner, "z", span, statement));
+                let z = state.map(|id| Tree::new(Node::Leaf(Leaf::Signal(id)), span));
+                let proportional = kp.map(|kp| kp * x.clone());
+                let u = match (proportional, z) {
+                    (Some(a), Some(z)) => a + z,
+                    (Some(only), None) | (None, Some(only)) => only,
+                    (None, None) => return None,
+                };
+                let limited = lo.is_some() || hi.is_some();
+                if let (Some(state), Some(ki)) = (state, ki) {
+                    let mut rate = ki * x;
+                    if let (Some(kaw), true) = (kaw, limited) {
+                        rate = rate + kaw * (this - u.clone());
+                    }
+                    let initial = Initial::Given(z0.unwrap_or(Tree::number(0.0)));
+                    self.graph.signals[state.index()].law = SignalLaw::Integrator { rate, initial };
+                }
+                let mut y = match (lo, hi) {
+                    (Some(lo), Some(hi)) => Tree::call(Function::Clamp, vec![u, lo, hi]),
+                    (Some(lo), None) => Tree::call(Function::Max, vec![u, lo]),
+                    (None, Some(hi)) => Tree::call(Function::Min, vec![u, hi]),
+                    (None, None) => u,
+                };
+                y.span = span;
+                SignalLaw::Algebraic(y)
+            }
+        })
+    }
+
+    fn waveform(
+        &mut self,
+        call: &Call,
+        row: &Signature,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Waveform> {
+        let place = Place::constant("a waveform's argument");
+        let given = self.arguments(call, row, span, d)?;
+        let lowered: Vec<Option<Expr>> = given
+            .into_iter()
+            .map(|value| match value {
+                Some(value) => self.lower(value, place, d),
+                None => Some(Tree::number(0.0)),
+            })
+            .collect();
+        let mut lowered = lowered.into_iter().collect::<Option<Vec<_>>>()?.into_iter();
+        let mut next = || lowered.next();
+        Some(match row.name {
+            "step" => Waveform::Step { at: next()?, before: next()?, after: next()? },
+            "ramp" => Waveform::Ramp { at: next()?, slope: next()? },
+            "pulse" => Waveform::Pulse {
+                low: next()?,
+                high: next()?,
+                delay: next()?,
+                rise: next()?,
+                fall: next()?,
+                width: next()?,
+                period: next()?,
+            },
+            _ => Waveform::Sine {
+                offset: next()?,
+                amplitude: next()?,
+                frequency: next()?,
+                delay: next()?,
+                damping: next()?,
+                phase: next()?,
+            },
+        })
+    }
+
+    /// `pwl(t0, y0; t1, y1; …)`
+    fn pwl(&mut self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Waveform> {
+        let what = "a waveform's argument";
+        let form = |span, message: &str| {
+            Diagnostic::error("E0216", span, message)
+                .help("its form is `pwl(t0, y0; t1, y1; …)`, each point a time and a value")
+        };
+        let mut points = vec![];
+        let mut last = f64::NEG_INFINITY;
+        let mut failed = false;
+        for row in &call.rows {
+            let (t, y) = match row.as_slice() {
+                [t, y] if t.label.is_none() && y.label.is_none() => match (&t.value, &y.value) {
+                    (Value::Expr(t), Value::Expr(y)) => (t, y),
+                    _ => {
+                        d.push(form(t.span.join(y.span), "a point of `pwl` is two values"));
+                        return None;
+                    }
+                },
+                _ => {
+                    let at =
+                        row.iter().map(|argument| argument.span).reduce(Span::join).unwrap_or(span);
+                    let says = match row.len() {
+                        1 => "only one value".to_string(),
+                        n => format!("{n} values"),
+                    };
+                    d.push(form(at, "a point of `pwl` is a time and a value").says(says));
+                    return None;
+                }
+            };
+            let place = Place::constant(what);
+            let (time, value) = (self.lower(t, place, d), self.lower(y, place, d));
+            if let Some(at) = time.as_ref().and_then(|time| self.evaluate(time, what, t.span, d)) {
+                if at < last {
+                    d.push(
+                        form(t.span, "the times of `pwl` must not decrease")
+                            .says("earlier than the point before"),
+                    );
+                    failed = true;
+                }
+                last = at;
+            }
+            match (time, value) {
+                (Some(time), Some(value)) => points.push((time, value)),
+                _ => failed = true,
+            }
+        }
+        (!failed).then_some(Waveform::Pwl(points))
+    }
+
+    /// A new hidden signal that belongs to `owner`.
+    pub fn hide(&mut self, owner: &str, part: &str, span: Span, statement: usize) -> SignalId {
+        let id = SignalId(self.graph.signals.len() as u32);
+        let taken = |name: &str| {
+            self.values.contains_key(name) || self.graph.signals.iter().any(|s| s.name == name)
+        };
+        let mut name = format!("{owner}_{part}");
+        let mut count = 1;
+        while taken(&name) {
+            count += 1;
+            name = format!("{owner}_{part}{count}");
+        }
+        self.graph.signals.push(Signal {
+            name,
+            law: SignalLaw::Algebraic(Tree::number(0.0)),
+            origin: SignalOrigin::Hidden,
+            span,
+            unit: None,
+        });
+        self.signal_order.push((statement, id.index()));
+        id
+    }
+
+    fn drive_inputs(&mut self, overrides: &[String], d: &mut Vec<Diagnostic>) {
+        let drives = std::mem::take(&mut self.drives);
+        let mut driven: Vec<Option<Span>> = vec![None; self.graph.signals.len()];
+        for (name, valued) in &drives {
+            let Some(id) = self.input(name, d) else { continue };
+            if let Some(first) = driven[id.index()].replace(name.span) {
+                d.push(
+                    Diagnostic::error(
+                        "E0220",
+                        name.span,
+                        format!("`{}` is driven twice", name.text),
+                    )
+                    .says("driven again here")
+                    .label(first, "first driven here"),
+                );
+                continue;
+            }
+            if let Some(law) = self.signal_law(id, valued.value, valued.statement, d) {
+                self.graph.signals[id.index()].law = law;
+            }
+        }
+        self.drives = drives;
+        for text in overrides {
+            let before = d.len();
+            if let Some((name, value)) = parse_drive(text, Span::NONE.file, d)
+                && let Some(id) = self.input(&name, d)
+            {
+                driven[id.index()] = Some(Span::NONE);
+                let statement = self.signal_order[id.index()].0;
+                if let Some(law) = self.signal_law(id, &value, statement, d) {
+                    self.graph.signals[id.index()].law = law;
+                }
+            }
+            for error in &mut d[before..] {
+                error.notes.push(format!("in the drive that was given: {text}"));
+            }
+        }
+        for (k, signal) in self.graph.signals.iter().enumerate() {
+            let open = driven.get(k).is_some_and(Option::is_none);
+            if signal.origin == SignalOrigin::Input && open {
+                self.graph.experiment.undriven.push(SignalId(k as u32));
+            }
+        }
+        for id in &self.graph.experiment.undriven {
+            let signal = &self.graph.signals[id.index()];
+            d.push(
+                Diagnostic::warning(
+                    "W0201",
+                    signal.span,
+                    format!("nothing drives the input `{}`", signal.name),
+                )
+                .says("taken as 0")
+                .help(format!("say what it gets: `drive {} = …`", signal.name)),
+            );
+        }
+    }
+
+    /// The input of a name.
+    fn input(&self, name: &Name, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
+        let text = name.text.as_str();
+        let inputs = || self.graph.signals.iter().filter(|s| s.origin == SignalOrigin::Input);
+        match self.values.get(text) {
+            Some(Meaning::Signal(id))
+                if self.graph.signals[id.index()].origin == SignalOrigin::Input =>
+            {
+                return Some(*id);
+            }
+            _ if self.excused.contains(text) => {}
+            Some(meaning) => {
+                let what = match meaning {
+                    Meaning::Parameter(_) => "a parameter",
+                    Meaning::Signal(_) => "a signal with a law of its own",
+                };
+                d.push(
+                    Diagnostic::error("E0219", name.span, format!("`{text}` is no input"))
+                        .says("only inputs are driven")
+                        .label(self.value_span(*meaning), format!("`{text}` is {what}")),
+                );
+            }
+            None => {
+                let error =
+                    Diagnostic::error("E0219", name.span, format!("no input is called `{text}`"))
+                        .says("not declared anywhere");
+                d.push(match nearest(text, inputs().map(|signal| signal.name.as_str())) {
+                    Some(meant) => did_you_mean(error, name.span, meant),
+                    None => error.help(format!("declare it: `input {text}`")),
+                });
+            }
+        }
+        None
+    }
+
+    fn check_outputs(&self, d: &mut Vec<Diagnostic>) {
+        for name in &self.outputs {
+            let text = name.text.as_str();
+            if self.excused.contains(text) {
+                continue;
+            }
+            match self.values.get(text) {
+                Some(Meaning::Signal(_)) => {}
+                Some(meaning) => d.push(
+                    Diagnostic::error("E0224", name.span, format!("`{text}` is no signal"))
+                        .says("outputs are signals")
+                        .label(self.value_span(*meaning), "a parameter"),
+                ),
+                None => {
+                    let error = Diagnostic::error(
+                        "E0224",
+                        name.span,
+                        format!("no signal is called `{text}`"),
+                    )
+                    .says("not declared anywhere");
+                    let names = self.graph.signals.iter().map(|s| s.name.as_str());
+                    d.push(match nearest(text, names) {
+                        Some(meant) => did_you_mean(error, name.span, meant),
+                        None => error.help(format!("declare it: `signal {text} = …`")),
+                    });
+                }
+            }
+        }
+    }
+
+    /// Loops of signals that no bond and no memory breaks.
+    fn find_loops(&self, d: &mut Vec<Diagnostic>) {
+        let uses: Vec<Vec<usize>> = self
+            .graph
+            .signals
+            .iter()
+            .map(|signal| {
+                let mut uses = vec![];
+                if let SignalLaw::Algebraic(expr) = &signal.law {
+                    expr.leaves(&mut |leaf, _| {
+                        if let Leaf::Signal(id) = leaf {
+                            uses.push(id.index());
+                        }
+                    });
+                }
+                uses
+            })
+            .collect();
+        // 0: not seen, 1: on the path, 2: done.
+        let mut marks = vec![0u8; uses.len()];
+        for first in 0..uses.len() {
+            let mut path: Vec<(usize, usize)> = vec![(first, 0)];
+            while let Some((k, next)) = path.last_mut() {
+                let k = *k;
+                if *next == 0 && marks[k] == 2 {
+                    path.pop();
+                    continue;
+                }
+                marks[k] = 1;
+                let Some(&used) = uses[k].get(*next) else {
+                    marks[k] = 2;
+                    path.pop();
+                    continue;
+                };
+                *next += 1;
+                match marks[used] {
+                    0 => path.push((used, 0)),
+                    1 => {
+                        let start = path.iter().position(|(on, _)| *on == used).unwrap_or(0);
+                        d.push(self.signal_loop(path[start..].iter().map(|(k, _)| *k).collect()));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    fn signal_loop(&self, ring: Vec<usize>) -> Diagnostic {
+        let name = |k: &usize| format!("`{}`", self.graph.signals[*k].name);
+        let first = &self.graph.signals[ring[0]];
+        let message = format!("the signal {} depends on itself at every instant", name(&ring[0]));
+        let mut error = Diagnostic::error("E0408", first.span, message).says("this signal");
+        for k in &ring[1..] {
+            error = error.label(self.graph.signals[*k].span, "through this one");
+        }
+        if ring.len() > 1 {
+            let names: Vec<String> = ring.iter().chain([&ring[0]]).map(name).collect();
+            error = error.because(format!("the loop is {}", names.join(" → ")));
+        }
+        error.help("a loop of signals needs a memory in it: `lag(x, tau)` or `integ(x)`")
+    }
+
+    /// File order, hidden signals before the one that they belong to.
+    fn sort_signals(&mut self) {
+        let mut order: Vec<usize> = (0..self.graph.signals.len()).collect();
+        order.sort_by_key(|k| self.signal_order[*k]);
+        let mut place = vec![SignalId(0); order.len()];
+        for (new, old) in order.iter().enumerate() {
+            place[*old] = SignalId(new as u32);
+        }
+        let graph = &mut self.graph;
+        let mut signals: Vec<Option<Signal>> =
+            std::mem::take(&mut graph.signals).into_iter().map(Some).collect();
+        graph.signals = order.iter().filter_map(|old| signals[*old].take()).collect();
+        let dimensions = order.iter().map(|old| self.signal_dimensions[*old]).collect();
+        self.signal_dimensions = dimensions;
+        self.signal_order.sort_unstable();
+        for meaning in self.values.values_mut() {
+            if let Meaning::Signal(id) = meaning {
+                *id = place[id.index()];
+            }
+        }
+        for id in &mut graph.experiment.undriven {
+            *id = place[id.index()];
+        }
+        let renumber = |expr: &mut Expr| {
+            *expr = expr.map(&mut |leaf, span| {
+                let leaf = match leaf {
+                    Leaf::Signal(id) => Leaf::Signal(place[id.index()]),
+                    other => other.clone(),
+                };
+                Tree::new(Node::Leaf(leaf), span)
+            });
+        };
+        for signal in &mut graph.signals {
+            match &mut signal.law {
+                SignalLaw::Algebraic(expr) => renumber(expr),
+                SignalLaw::Integrator { rate, .. } => renumber(rate),
+                SignalLaw::Waveform(_) => {}
+            }
+        }
+        for vertex in &mut graph.vertices {
+            match &mut vertex.law {
+                Law::Zero | Law::One => {}
+                Law::Source { value, .. } => renumber(value),
+                Law::Dissipator(
+                    Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
+                ) => renumber(law),
+                Law::Store { law, .. } => match law {
+                    StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
+                        renumber(law);
+                    }
+                },
+                Law::Rate { rate, .. } => renumber(rate),
+                Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
+                    Modulus::Ratio(law) | Modulus::Gain(law) => renumber(law),
+                },
+            }
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Reading: from a text to [`File`], statement by statement.
+//!
+//! Nothing a text holds can make it fail: what cannot be read becomes a [`StatementKind::Unreadable`] and a
+//! diagnostic, and reading goes on at the next statement.
+
+pub mod tree;
+mod scan;
+mod parse;
+mod expression;
+mod expected;
+
+pub use parse::{parse, parse_drive, parse_observe, parse_value};
+pub use scan::STATEMENT_WORDS;
+pub use tree::{
+    Argument, Arrow, Call, Chain, ChainEnd, Expr, File, Label, Leaf, Name, ObserveItem, Path,
+    Statement, StatementKind, Trivia, TriviaKind, Value,
+};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,225 @@
+//! What a `.bg` file says, before any name is looked up; every part with its place in the text.
+
+use crate::expr;
+use crate::quantity::Unit;
+use crate::source::{FileId, Span};
+
+/// A file: its statements in order, and the places of all blanks and comments, so that a formatter needs no second
+/// parser.
+#[derive(Clone, Debug)]
+pub struct File {
+    /// The text it was read from.
+    pub file: FileId,
+    /// Its statements.
+    pub statements: Vec<Statement>,
+    /// Blanks, line ends and comments, in order.
+    pub trivia: Vec<Trivia>,
+}
+
+/// What stands between the words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Trivia {
+    /// Which.
+    pub kind: TriviaKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// The sorts of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TriviaKind {
+    /// Spaces and tabs.
+    Blank,
+    /// One line's end.
+    LineEnd,
+    /// `#` to before the line's end.
+    Comment,
+}
+
+/// A statement and its place, without the blanks around it.
+#[derive(Clone, Debug)]
+pub struct Statement {
+    /// What it says.
+    pub kind: StatementKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// The statements of the language.
+#[derive(Clone, Debug)]
+pub enum StatementKind {
+    /// Elements and bonds.
+    Chain(Chain),
+    /// `param L = 1.2 mH "armature inductance"`
+    Parameter {
+        /// Its name.
+        name: Name,
+        /// Its value.
+        value: Expr,
+        /// The text in quotes, without them.
+        description: Option<Name>,
+    },
+    /// `signal x = integ(f(rod))`
+    Signal {
+        /// Its name.
+        name: Name,
+        /// What it is.
+        value: Expr,
+    },
+    /// `input x_ref`
+    Input(Vec<Name>),
+    /// `output x`
+    Output(Vec<Name>),
+    /// `drive x_ref = step(0.1 s, 0 mm, 20 mm)`
+    Drive {
+        /// The input.
+        name: Name,
+        /// What it gets.
+        value: Expr,
+    },
+    /// `simulate until 1.5 s step 1 ms`
+    Simulate {
+        /// End of the run.
+        until: Option<Expr>,
+        /// Output interval.
+        step: Option<Expr>,
+    },
+    /// `options reltol = 1e-5, method = trbdf2`: each a key and its text.
+    Options(Vec<(Name, Name)>),
+    /// `observe x in mm, e(pump_port) in bar as "pump pressure"`
+    Observe(Vec<ObserveItem>),
+    /// Could not be read; the error has been reported.
+    Unreadable,
+}
+
+/// A name or another word and its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Name {
+    /// As written.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+}
+
+/// `rod`, `t.1`, `motor.rotor`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    /// The first name.
+    pub name: Name,
+    /// What follows after dots: names or numbers.
+    pub members: Vec<Name>,
+    /// All of it.
+    pub span: Span,
+}
+
+impl Path {
+    /// As written, without blanks.
+    pub fn text(&self) -> String {
+        let members = self.members.iter().flat_map(|member| [".", member.text.as_str()]);
+        std::iter::once(self.name.text.as_str()).chain(members).collect()
+    }
+}
+
+/// `Se:U(10 V) -> 1:mesh -> R:R, I:L`: lists of ends, joined by arrows. Only the last list may have several ends.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// What the first arrow comes from, or what is declared when there is no arrow.
+    pub first: Vec<ChainEnd>,
+    /// The arrows and what they go to.
+    pub links: Vec<(Arrow, Vec<ChainEnd>)>,
+}
+
+/// An arrow, with or without a causal stroke.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrow {
+    /// Where the stroke is drawn.
+    pub stroke: Option<crate::bond::graph::Stroke>,
+    /// Where the arrow stands.
+    pub span: Span,
+}
+
+/// An end of an arrow: a name, and where it is declared also its kind and arguments.
+#[derive(Clone, Debug)]
+pub struct ChainEnd {
+    /// What stands before the colon.
+    pub kind: Option<Name>,
+    /// The name, with the port after a dot.
+    pub path: Path,
+    /// What stands in the brackets.
+    pub arguments: Option<Vec<Argument>>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// An argument of an element or of a call: `1/alpha`, `q0 = 10`, `der(e) = …`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Argument {
+    /// What stands before `=`.
+    pub label: Option<Label>,
+    /// The value.
+    pub value: Value,
+    /// All of it.
+    pub span: Span,
+}
+
+/// What stands before the `=` of an argument.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Label {
+    /// The name; that in the brackets of `der( )`.
+    pub name: Name,
+    /// Whether it is a derivative, `der(name)`.
+    pub derivative: bool,
+    /// All of it.
+    pub span: Span,
+}
+
+/// A value of an argument.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// An expression.
+    Expr(Expr),
+    /// `[a, b; c, d]`, by rows.
+    Matrix(Vec<Vec<Expr>>),
+    /// `a -> b`: a bond, in readings.
+    Bond(Path, Path),
+    /// `"name.csv"`
+    Text(Name),
+}
+
+/// An item of `observe`.
+#[derive(Clone, Debug)]
+pub struct ObserveItem {
+    /// What is observed.
+    pub expr: Expr,
+    /// After `in`.
+    pub unit: Option<(Unit, Span)>,
+    /// After `as`, without quotes.
+    pub name: Option<Name>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// An expression of a file.
+pub type Expr = expr::Expr<Leaf>;
+
+/// What the expressions of a file are made of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Leaf {
+    /// A number with a unit, in SI.
+    Quantity(f64, Unit),
+    /// A name.
+    Name(Path),
+    /// A call of anything but the functions of the table: a reading, a waveform, a dynamic function.
+    Call(Call),
+}
+
+/// `e(rod)`, `f(a -> b)[2]`, `pwl(0, 1; 2, 3)`, `pi(x, Kp = 1)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Call {
+    /// What is called.
+    pub name: Name,
+    /// Its arguments, by the rows that `;` makes.
+    pub rows: Vec<Vec<Argument>>,
+    /// After it in square brackets.
+    pub index: Option<Expr>,
+}
