@@ -1,46 +1,13 @@
 //! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
 
+pub mod names;
 pub mod header;
+pub mod read;
 pub mod write;
 
 use crate::expr;
 use crate::source::Span;
-use std::collections::HashMap;
-
-/// An interned name. SPICE folds case: names that differ only in case are one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Name(pub u32);
-
-/// The names of a netlist, spelled as first seen.
-#[derive(Clone, Debug, Default)]
-pub struct Names {
-    spelled: Vec<String>,
-    folded: HashMap<String, Name>,
-}
-
-impl Names {
-    /// The name of a text.
-    pub fn intern(&mut self, text: &str) -> Name {
-        let folded = text.to_lowercase();
-        if let Some(name) = self.folded.get(&folded) {
-            return *name;
-        }
-        let name = Name(self.spelled.len() as u32);
-        self.spelled.push(text.to_string());
-        self.folded.insert(folded, name);
-        name
-    }
-
-    /// The name of a text that has been seen before.
-    pub fn find(&self, text: &str) -> Option<Name> {
-        self.folded.get(&text.to_lowercase()).copied()
-    }
-
-    /// How a name was first spelled.
-    pub fn text(&self, name: Name) -> &str {
-        &self.spelled[name.0 as usize]
-    }
-}
+pub use names::{Name, Names};
 
 /// An expression of a netlist.
 pub type Expr = expr::Expr<Leaf>;
@@ -232,4 +199,13 @@ pub struct Netlist {
     pub header: Vec<(String, String)>,
     /// Its cards, in order.
     pub cards: Vec<Card>,
+}
+
+/// A number in plain figures, without suffix: the shortest text that reads back as the same bits.
+pub fn plain(value: f64) -> String {
+    let text = format!("{value:?}");
+    match text.strip_suffix(".0") {
+        Some(whole) => whole.to_string(),
+        None => text,
+    }
 }

@@ -1,0 +1,357 @@
+//! Cards that begin with a dot.
+
+use super::{Cursor, Reader};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Node;
+use crate::netlist::{CardKind, Expr, Leaf, Subcircuit};
+use crate::quantity::nearest;
+use crate::source::Span;
+
+/// What becomes of a card.
+pub enum Treatment {
+    /// It is read.
+    Read(fn(&mut Reader, &mut Cursor) -> Option<CardKind>),
+    /// It is skipped with a warning, for a reason.
+    Skipped(&'static str),
+    /// It is an error, for a reason.
+    Refused(&'static str),
+}
+
+use Treatment::{Read, Refused, Skipped};
+
+const ANALYSIS: &str = "this analysis is not computed yet";
+const ONE_FILE: &str = "netlists of several files are not read yet: paste the text in";
+const RESULT: &str = "it only asks for a result that is not computed here";
+
+/// Every card but `.title`, `.subckt`, `.ends`, `.control` and `.end`, which the reader itself knows.
+#[rustfmt::skip]
+pub const CARDS: &[(&str, Treatment)] = &[
+    ("param", Read(parameters)),
+    ("params", Read(parameters)),
+    ("model", Read(model)),
+    ("options", Read(options)),
+    ("option", Read(options)),
+    ("opt", Read(options)),
+    ("ic", Read(initial)),
+    ("save", Read(|reader, cursor| save(reader, cursor, false))),
+    ("print", Read(|reader, cursor| save(reader, cursor, true))),
+    ("tran", Read(transient)),
+    ("op", Read(|_, _| Some(CardKind::OperatingPoint))),
+    ("nodeset", Skipped("it is a hint for another solver's operating point")),
+    ("plot", Skipped(RESULT)),
+    ("probe", Skipped(RESULT)),
+    ("four", Skipped(RESULT)),
+    ("meas", Skipped(RESULT)),
+    ("measure", Skipped(RESULT)),
+    ("width", Skipped("it lays out another simulator's print")),
+    ("ac", Refused(ANALYSIS)),
+    ("dc", Refused(ANALYSIS)),
+    ("tf", Refused(ANALYSIS)),
+    ("pz", Refused(ANALYSIS)),
+    ("sens", Refused(ANALYSIS)),
+    ("noise", Refused(ANALYSIS)),
+    ("disto", Refused(ANALYSIS)),
+    ("step", Refused(ANALYSIS)),
+    ("include", Refused(ONE_FILE)),
+    ("inc", Refused(ONE_FILE)),
+    ("lib", Refused(ONE_FILE)),
+    ("func", Refused("functions of one's own are not read yet: write their expressions out")),
+    ("global", Refused("global nodes are not read yet: hand the node over as a terminal")),
+    ("csparam", Refused("it belongs to ngspice's command language")),
+    ("temp", Refused("every circuit is at 27 °C")),
+    ("if", Refused("conditional netlists are not read yet")),
+    ("elseif", Refused("conditional netlists are not read yet")),
+    ("else", Refused("conditional netlists are not read yet")),
+    ("endif", Refused("conditional netlists are not read yet")),
+];
+
+/// The card of a line, whose keyword has been read.
+pub fn card(reader: &mut Reader, cursor: &mut Cursor, span: Span) -> Option<CardKind> {
+    let keyword = cursor.text[1..cursor.at].trim().to_lowercase();
+    let place = cursor.span(reader, 0, cursor.at.max(1));
+    match CARDS.iter().find(|(name, _)| *name == keyword) {
+        Some((_, Read(read))) => {
+            let kind = read(reader, cursor)?;
+            reader.leftover(cursor);
+            Some(kind)
+        }
+        Some((name, Skipped(why))) => {
+            reader.diagnostics.push(
+                Diagnostic::warning("W0703", span, format!("`.{name}` is skipped")).because(*why),
+            );
+            None
+        }
+        Some((name, Refused(why))) => {
+            let error =
+                Diagnostic::error("E0702", place, format!("`.{name}` is not read")).because(*why);
+            reader.diagnostics.push(error);
+            None
+        }
+        None => {
+            let error = Diagnostic::error("E0701", place, format!("unknown card `.{keyword}`"));
+            let known = CARDS
+                .iter()
+                .map(|(name, _)| *name)
+                .chain(["subckt", "ends", "end", "control", "title"]);
+            reader.diagnostics.push(match nearest(&keyword, known) {
+                Some(name) => error.help(format!("did you mean `.{name}`?")),
+                None => error,
+            });
+            None
+        }
+    }
+}
+
+/// `.subckt name ports … [params:] [parameter=default …]`.
+pub fn subcircuit(reader: &mut Reader, cursor: &mut Cursor) -> Option<Subcircuit> {
+    let word = cursor.word();
+    let mut ports = vec![];
+    while cursor.clone().key().is_none() {
+        let (word, _) = cursor.node();
+        if word.is_empty() || word.eq_ignore_ascii_case("params:") {
+            break;
+        }
+        ports.push(reader.names.node(word));
+    }
+    let mut parameters = vec![];
+    while let Some(key) = cursor.key() {
+        match reader.value(cursor, "the default of the parameter") {
+            Some(value) => parameters.push((reader.name(key), value)),
+            None => break,
+        }
+    }
+    reader.leftover(cursor);
+    // Even one without a name is opened, so that its `.ends` closes it.
+    if word.0.is_empty() {
+        reader.missing(cursor, "the name of the subcircuit");
+    }
+    Some(Subcircuit { name: reader.name(word), ports, parameters, cards: vec![] })
+}
+
+/// `.param name=value name={expression} …`; a value may also be an expression with blanks, up to the next `name=`.
+fn parameters(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let mut parameters = vec![];
+    while !cursor.is_done() {
+        let Some(key) = cursor.key() else {
+            let (word, from) = cursor.word();
+            let call = cursor.peek() == Some(b'(');
+            let span = cursor.span(reader, from, from + word.len().max(1));
+            let error = if call {
+                Diagnostic::error(
+                    "E0702",
+                    span,
+                    format!("`{word}` is a function, and those are not read yet"),
+                )
+            } else {
+                Diagnostic::error("E0703", span, "`name=value` is missing")
+            };
+            reader.diagnostics.push(error);
+            cursor.at = cursor.text.len();
+            return None;
+        };
+        let name = reader.name(key);
+        cursor.blanks();
+        let (from, to) = (cursor.at, before_next_key(cursor));
+        cursor.at = to;
+        let text = cursor.text[from..to].trim_end_matches([' ', '\t', ',']);
+        let value = reader.grouped(cursor, from, from + text.len());
+        parameters.push((name, value?));
+    }
+    if parameters.is_empty() {
+        reader.missing(cursor, "`name=value`");
+        return None;
+    }
+    Some(CardKind::Parameters(parameters))
+}
+
+/// Where a value ends that the next `name=` follows, or the line's end.
+fn before_next_key(cursor: &Cursor) -> usize {
+    let bytes = cursor.text.as_bytes();
+    let (mut depth, mut quoted) = (0i32, false);
+    for at in cursor.at..bytes.len() {
+        match bytes[at] {
+            b'\'' => quoted = !quoted,
+            b'(' | b'{' => depth += 1,
+            b')' | b'}' => depth -= 1,
+            b'=' if depth <= 0 && !quoted => {
+                let compares = bytes.get(at + 1) == Some(&b'=')
+                    || matches!(bytes[at - 1], b'=' | b'<' | b'>' | b'!');
+                if !compares {
+                    let before = cursor.text[cursor.at..at].trim_end();
+                    let word =
+                        before.rfind(|c: char| c.is_whitespace() || c == ',').map_or(0, |k| k + 1);
+                    // A key that follows a value without a blank is no key: the expression is wrong, and says so.
+                    return if word == 0 { bytes.len() } else { cursor.at + word };
+                }
+            }
+            _ => {}
+        }
+    }
+    bytes.len()
+}
+
+/// `.model name type(key=value …)`, the brackets being optional.
+fn model(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let word = cursor.word();
+    if word.0.is_empty() {
+        reader.missing(cursor, "the name of the model");
+        return None;
+    }
+    let name = reader.name(word);
+    cursor.loose();
+    let (kind, _) = cursor.word();
+    if kind.is_empty() {
+        reader.missing(cursor, "the type of the model");
+        return None;
+    }
+    let mut parameters = vec![];
+    while let Some((key, _)) = cursor.key() {
+        let value = reader.value(cursor, "the value of the parameter")?;
+        parameters.push((key.to_lowercase(), value));
+    }
+    cursor.loose();
+    Some(CardKind::Model { name, kind: kind.to_lowercase(), parameters })
+}
+
+/// `.options key=value flag …`. Numbers lose their suffixes.
+fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let mut options = vec![];
+    while !cursor.is_done() {
+        if let Some((key, _)) = cursor.key() {
+            let (word, from) = cursor.word();
+            if word.is_empty() {
+                reader.missing(cursor, "the value of the option");
+                return None;
+            }
+            let value = match super::number::number(word) {
+                Some(number) if number.end == word.len() => {
+                    let span = cursor.span(reader, from, from + word.len());
+                    reader.diagnostics.extend(super::suffix_warning(word, &number, span));
+                    crate::netlist::plain(number.value)
+                }
+                _ => word.to_lowercase(),
+            };
+            options.push((key.to_lowercase(), value));
+        } else {
+            let (flag, _) = cursor.word();
+            if flag.is_empty() {
+                return Some(CardKind::Options(options));
+            }
+            options.push((flag.to_lowercase(), "1".to_string()));
+        }
+    }
+    Some(CardKind::Options(options))
+}
+
+/// `.ic v(node)=value …`.
+fn initial(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let mut values = vec![];
+    while !cursor.is_done() {
+        let here = cursor.here(reader);
+        let (word, _) = cursor.word();
+        if !word.eq_ignore_ascii_case("v") || !cursor.take(b'(') {
+            let error = Diagnostic::error("E0703", here, "`v(node)=value` is missing")
+                .help("currents of inductors start at the `ic=` of their cards");
+            reader.diagnostics.push(error);
+            return None;
+        }
+        let node = reader.node(cursor, "the node")?;
+        let closed = cursor.take(b')') && cursor.take(b'=');
+        if !closed {
+            reader.missing(cursor, "`)=`");
+            return None;
+        }
+        values.push((node, reader.value(cursor, "the value")?));
+    }
+    Some(CardKind::Initial(values))
+}
+
+/// `.tran step stop [start [hmax]] [uic]`.
+fn transient(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let (mut values, mut uic) = (vec![], false);
+    while !cursor.is_done() {
+        if cursor.next_word().eq_ignore_ascii_case("uic") {
+            cursor.word();
+            uic = true;
+        } else if values.len() < 4 {
+            values.push(reader.value(cursor, "a time")?);
+        } else {
+            break;
+        }
+    }
+    let mut values = values.into_iter();
+    let (Some(step), Some(stop)) = (values.next(), values.next()) else {
+        reader.missing(cursor, "the step or the end of `.tran step stop [start [hmax]] [uic]`");
+        return None;
+    };
+    Some(CardKind::Transient { step, stop, start: values.next(), hmax: values.next(), uic })
+}
+
+/// `.save v(a) i(l1) {expression} node …`; `.print tran …`. No items at all mean everything.
+fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKind> {
+    if print {
+        let (kind, _) = cursor.word();
+        if !matches!(kind.to_lowercase().as_str(), "tran" | "op") {
+            let span = cursor.span(reader, 0, cursor.at);
+            let warning = Diagnostic::warning("W0703", span, format!("`.print {kind}` is skipped"))
+                .because(ANALYSIS);
+            reader.diagnostics.push(warning);
+            cursor.at = cursor.text.len();
+            return None;
+        }
+    }
+    let (mut items, mut all) = (vec![], false);
+    while !cursor.is_done() {
+        let from = cursor.at;
+        let to = end_of_item(cursor);
+        cursor.at = to;
+        let text = &cursor.text[from..to];
+        if text.eq_ignore_ascii_case("all") {
+            all = true;
+            continue;
+        }
+        items.push(item(reader, cursor, from, to)?);
+    }
+    Some(CardKind::Save { print, items: if all { vec![] } else { items } })
+}
+
+/// Items end at blanks outside brackets and braces.
+fn end_of_item(cursor: &Cursor) -> usize {
+    let mut depth = 0i32;
+    for (at, byte) in cursor.text.bytes().enumerate().skip(cursor.at) {
+        match byte {
+            b'(' | b'{' => depth += 1,
+            b')' | b'}' => depth -= 1,
+            b' ' | b'\t' | b'\r' if depth <= 0 => return at,
+            _ => {}
+        }
+    }
+    cursor.text.trim_end().len().max(cursor.at)
+}
+
+/// One item: how it is written, and what it means. `node` is v(node), `v1#branch` is i(v1), `@r1[i]` is i(r1).
+fn item(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    from: usize,
+    to: usize,
+) -> Option<(String, Expr)> {
+    let text = &cursor.text[from..to];
+    let span = cursor.span(reader, from, to);
+    let current = text.strip_suffix("#branch").or_else(|| {
+        let (device, quantity) = text.strip_prefix('@')?.strip_suffix(']')?.split_once('[')?;
+        matches!(quantity.to_ascii_lowercase().as_str(), "i" | "id" | "current").then_some(device)
+    });
+    if let Some(device) = current {
+        let leaf = Leaf::Current(reader.names.intern(device));
+        return Some((format!("i({device})"), Expr::new(Node::Leaf(leaf), span)));
+    }
+    if text.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+        && !text.contains(['(', ')', '{', '*', '/', ','])
+    {
+        let leaf = Leaf::Voltage(reader.names.node(text), None);
+        return Some((format!("v({text})"), Expr::new(Node::Leaf(leaf), span)));
+    }
+    let expr = reader.grouped(cursor, from, to)?;
+    Some((text.to_string(), expr))
+}

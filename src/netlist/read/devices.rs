@@ -1,0 +1,394 @@
+//! Device cards, by their first letter.
+
+use super::{Cursor, Reader, expression, waveforms};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Node;
+use crate::netlist::{Device, Element, Expr, Name};
+use std::sync::Arc;
+
+/// One row of the table: a letter, the number of nodes that its card names first, and what follows them.
+pub struct Letter {
+    /// The first letter of its names, in upper case.
+    pub letter: u8,
+    /// How many nodes; 0 where the card itself says.
+    pub nodes: usize,
+    /// How a card goes, for messages.
+    pub form: &'static str,
+    read: fn(&mut Reader, &mut Cursor, &mut Vec<Name>) -> Option<Element>,
+}
+
+/// Every letter that is read.
+#[rustfmt::skip]
+pub const LETTERS: &[Letter] = &[
+    Letter { letter: b'R', nodes: 2, form: "Rname n+ n- value", read: resistor },
+    Letter { letter: b'C', nodes: 2, form: "Cname n+ n- value [ic=volts]", read: capacitor },
+    Letter { letter: b'L', nodes: 2, form: "Lname n+ n- value [ic=amperes]", read: inductor },
+    Letter { letter: b'K', nodes: 0, form: "Kname L1 L2 coupling", read: mutual },
+    Letter { letter: b'V', nodes: 2, form: "Vname n+ n- [value] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…)]", read: |r, c, _| Some(Element::VoltageSource(waveforms::source(r, c)?)) },
+    Letter { letter: b'I', nodes: 2, form: "Iname n+ n- [value] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…)]", read: |r, c, _| Some(Element::CurrentSource(waveforms::source(r, c)?)) },
+    Letter { letter: b'E', nodes: 2, form: "Ename n+ n- c+ c- gain, or Ename n+ n- VALUE={expression}", read: vcvs },
+    Letter { letter: b'G', nodes: 2, form: "Gname n+ n- c+ c- gain, or Gname n+ n- VALUE={expression}", read: vccs },
+    Letter { letter: b'F', nodes: 2, form: "Fname n+ n- device gain", read: cccs },
+    Letter { letter: b'H', nodes: 2, form: "Hname n+ n- device gain", read: ccvs },
+    Letter { letter: b'B', nodes: 2, form: "Bname n+ n- V=expression, or I=expression", read: behavioural },
+    Letter { letter: b'S', nodes: 2, form: "Sname n+ n- c+ c- model [ON | OFF]", read: switch },
+    Letter { letter: b'W', nodes: 2, form: "Wname n+ n- device model [ON | OFF]", read: current_switch },
+    Letter { letter: b'D', nodes: 2, form: "Dname anode cathode model [area]", read: diode },
+    Letter { letter: b'X', nodes: 0, form: "Xname nodes … subcircuit [parameter=value …]", read: instance },
+];
+
+/// Letters of SPICE that are not read, and what they stand for.
+#[rustfmt::skip]
+pub const OTHER_LETTERS: &[(u8, &str)] = &[
+    (b'A', "an XSPICE code model"), (b'J', "a junction field-effect transistor"), (b'M', "a MOS transistor"),
+    (b'N', "a Verilog-A device"), (b'O', "a lossy transmission line"), (b'P', "a coupled transmission line"),
+    (b'Q', "a bipolar transistor"), (b'T', "a transmission line"), (b'U', "an RC line or a digital device"),
+    (b'Y', "a lossy transmission line"), (b'Z', "a MESFET"),
+];
+
+/// The device of a line.
+pub fn device(reader: &mut Reader, cursor: &mut Cursor) -> Option<Device> {
+    let (name, from) = cursor.word();
+    let span = cursor.span(reader, from, from + name.len().max(1));
+    let Some(first) = name.bytes().next().map(|byte| byte.to_ascii_uppercase()) else {
+        let letter = cursor.text.chars().next().unwrap_or(' ');
+        let span = cursor.span(reader, 0, letter.len_utf8());
+        let error = Diagnostic::error("E0701", span, format!("no card begins with `{letter}`"));
+        reader.diagnostics.push(error);
+        return None;
+    };
+    let Some(row) = LETTERS.iter().find(|row| row.letter == first) else {
+        let error = match OTHER_LETTERS.iter().find(|(letter, _)| *letter == first) {
+            Some((_, what)) => Diagnostic::error(
+                "E0702",
+                span,
+                format!("`{name}` is {what}, which is not read yet"),
+            )
+            .because("a card's first letter says what it is")
+            .help("devices that are read: R L C K V I E F G H B S W D X"),
+            None if first == b'+' => {
+                Diagnostic::error("E0701", span, "there is no line to continue")
+            }
+            None => {
+                let letter = name.chars().next().unwrap_or(' ');
+                Diagnostic::error("E0701", span, format!("no card begins with `{letter}`"))
+            }
+        };
+        reader.diagnostics.push(error);
+        return None;
+    };
+    let before = reader.diagnostics.len();
+    let element = element(reader, cursor, row);
+    let (Some((nodes, element)), false) =
+        (element, crate::diagnostic::has_errors(&reader.diagnostics[before..]))
+    else {
+        if let Some(error) = reader.diagnostics[before..].first_mut()
+            && error.help.is_none()
+        {
+            error.help = Some(row.form.to_string());
+        }
+        return None;
+    };
+    let name = reader.names.intern(name);
+    Some(Device { name, nodes, element })
+}
+
+fn element(reader: &mut Reader, cursor: &mut Cursor, row: &Letter) -> Option<(Vec<Name>, Element)> {
+    let mut nodes = Vec::with_capacity(row.nodes);
+    for k in 0..row.nodes {
+        nodes.push(reader.node(cursor, if k == 0 { "the first node" } else { "the second node" })?);
+    }
+    let element = (row.read)(reader, cursor, &mut nodes)?;
+    reader.leftover(cursor);
+    Some((nodes, element))
+}
+
+fn resistor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let (value, _) = passive(reader, cursor, "r", "the resistance")?;
+    Some(Element::Resistor { value })
+}
+
+fn capacitor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let (value, initial) = passive(reader, cursor, "c", "the capacitance")?;
+    Some(Element::Capacitor { value, initial })
+}
+
+fn inductor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let (value, initial) = passive(reader, cursor, "l", "the inductance")?;
+    Some(Element::Inductor { value, initial })
+}
+
+/// A value, bare or after `r=`, and `ic=`.
+fn passive(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    key: &str,
+    what: &str,
+) -> Option<(Expr, Option<Expr>)> {
+    let (mut value, mut initial) = (None, None);
+    while !cursor.is_done() {
+        let here = *cursor;
+        match cursor.key() {
+            Some((word, _)) if word.eq_ignore_ascii_case(key) => {
+                value = Some(reader.value(cursor, what)?)
+            }
+            Some((word, _)) if word.eq_ignore_ascii_case("ic") && key != "r" => {
+                initial = Some(reader.value(cursor, "the initial value")?);
+            }
+            Some((word, from)) => {
+                let span = cursor.span(reader, from, from + word.len());
+                let error = Diagnostic::error("E0704", span, format!("`{word}=` is not read"));
+                reader.diagnostics.push(error);
+                *cursor = Cursor { at: cursor.text.len(), ..here };
+                return None;
+            }
+            None if value.is_none() => value = Some(reader.value(cursor, what)?),
+            None => break,
+        }
+    }
+    if value.is_none() {
+        reader.missing(cursor, what);
+    }
+    Some((value?, initial))
+}
+
+fn mutual(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let mut inductors = vec![];
+    while cursor.next_word().starts_with(['l', 'L', 'x', 'X']) {
+        let (word, at) = cursor.word();
+        let named = Cursor { at, ..*cursor };
+        // `K1 L1 L2 lk`: a parameter may begin with an l, but it comes last.
+        if inductors.len() >= 2 && cursor.is_done() {
+            *cursor = named;
+            break;
+        }
+        inductors.push(reader.name((word, at)));
+    }
+    if inductors.len() < 2 {
+        reader.missing(cursor, "the name of an inductor");
+        return None;
+    }
+    let coupling = reader.value(cursor, "the coupling")?;
+    Some(Element::Mutual { inductors, coupling })
+}
+
+/// What E and G may say after their nodes.
+enum Linked {
+    Gain(Expr, [Name; 2]),
+    Law(Expr),
+}
+
+fn linked(reader: &mut Reader, cursor: &mut Cursor) -> Option<Linked> {
+    let mut ahead = *cursor;
+    let (word, from) = ahead.word();
+    ahead.blanks();
+    let keyed = matches!(ahead.peek(), Some(b'=' | b'{' | b'\'' | b'('));
+    let is = |keyword: &str| word.eq_ignore_ascii_case(keyword) && keyed;
+    if is("value") || is("vol") || is("cur") {
+        *cursor = ahead;
+        cursor.take(b'=');
+        return Some(Linked::Law(law(reader, cursor)?));
+    }
+    if is("table") {
+        *cursor = ahead;
+        cursor.take(b'=');
+        return Some(Linked::Law(table(reader, cursor)?));
+    }
+    if is("poly") {
+        let span = cursor.span(reader, from, from + word.len());
+        reader.diagnostics.push(
+            Diagnostic::error("E0702", span, "polynomials are not read yet")
+                .help("write the polynomial as VALUE={…}"),
+        );
+        return None;
+    }
+    let first = reader.node(cursor, "the first controlling node")?;
+    let second = reader.node(cursor, "the second controlling node")?;
+    cursor.loose();
+    Some(Linked::Gain(reader.value(cursor, "the gain")?, [first, second]))
+}
+
+fn vcvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    Some(match linked(reader, cursor)? {
+        Linked::Gain(gain, control) => Element::Vcvs { gain, control },
+        Linked::Law(law) => Element::BehaviouralVoltage { law },
+    })
+}
+
+fn vccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    Some(match linked(reader, cursor)? {
+        Linked::Gain(gain, control) => Element::Vccs { gain, control },
+        Linked::Law(law) => Element::BehaviouralCurrent { law },
+    })
+}
+
+/// `TABLE {x} = (x0, y0) (x1, y1) …`; brackets, `=` and commas may be missing.
+fn table(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
+    let x = reader.value(cursor, "the expression of the table")?;
+    cursor.take(b'=');
+    let (mut points, from) = (vec![], cursor.at);
+    cursor.loose();
+    while !cursor.is_done() {
+        points.push(reader.value(cursor, "a number")?.as_number());
+        cursor.loose();
+    }
+    let points: Option<Vec<f64>> = points.into_iter().collect();
+    match points.and_then(|points| expression::table(&points)) {
+        Some(table) => {
+            let span = x.span;
+            Some(Expr::new(Node::Table(x, Arc::new(table)), span))
+        }
+        None => {
+            let span = cursor.span(reader, from, cursor.text.len());
+            let message = "a table takes pairs of numbers with rising abscissae";
+            reader.diagnostics.push(Diagnostic::error("E0706", span, message));
+            None
+        }
+    }
+}
+
+/// A law: `{…}`, `'…'`, or the rest of the line as it stands.
+fn law(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
+    let (rest, from) = cursor.rest();
+    let to = from + rest.len();
+    if rest.is_empty() {
+        reader.missing(cursor, "the expression");
+        return None;
+    }
+    cursor.at = cursor.text.len();
+    reader.grouped(cursor, from, to)
+}
+
+fn control(reader: &mut Reader, cursor: &mut Cursor) -> Option<Name> {
+    let (word, from) = cursor.node();
+    if word.is_empty() {
+        reader.missing(cursor, "the name of the controlling device");
+        return None;
+    }
+    if word.eq_ignore_ascii_case("poly") {
+        let span = cursor.span(reader, from, from + word.len());
+        reader.diagnostics.push(
+            Diagnostic::error("E0702", span, "polynomials are not read yet")
+                .help("write a B source with i(device)"),
+        );
+        return None;
+    }
+    Some(reader.name((word, from)))
+}
+
+fn cccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let control = control(reader, cursor)?;
+    Some(Element::Cccs { gain: reader.value(cursor, "the gain")?, control })
+}
+
+fn ccvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let control = control(reader, cursor)?;
+    Some(Element::Ccvs { gain: reader.value(cursor, "the gain")?, control })
+}
+
+fn behavioural(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let here = cursor.here(reader);
+    match cursor.key() {
+        Some(("v" | "V", _)) => Some(Element::BehaviouralVoltage { law: law(reader, cursor)? }),
+        Some(("i" | "I", _)) => Some(Element::BehaviouralCurrent { law: law(reader, cursor)? }),
+        _ => {
+            reader.diagnostics.push(Diagnostic::error("E0703", here, "`V=` or `I=` is missing"));
+            cursor.at = cursor.text.len();
+            None
+        }
+    }
+}
+
+fn model(reader: &mut Reader, cursor: &mut Cursor) -> Option<Name> {
+    let word = cursor.node();
+    if word.0.is_empty() {
+        reader.missing(cursor, "the name of the model");
+        return None;
+    }
+    Some(reader.name(word))
+}
+
+fn state(cursor: &mut Cursor) -> Option<bool> {
+    let word = cursor.next_word();
+    let on = match () {
+        () if word.eq_ignore_ascii_case("on") => Some(true),
+        () if word.eq_ignore_ascii_case("off") => Some(false),
+        () => None,
+    };
+    if on.is_some() {
+        cursor.word();
+    }
+    on
+}
+
+fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let first = reader.node(cursor, "the first controlling node")?;
+    let second = reader.node(cursor, "the second controlling node")?;
+    Some(Element::Switch {
+        model: model(reader, cursor)?,
+        control: [first, second],
+        on: state(cursor),
+    })
+}
+
+fn current_switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let control = control(reader, cursor)?;
+    Some(Element::CurrentSwitch { model: model(reader, cursor)?, control, on: state(cursor) })
+}
+
+fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    let model = model(reader, cursor)?;
+    let mut area = None;
+    while !cursor.is_done() {
+        let key = cursor.key().map(|(word, _)| word.to_ascii_lowercase());
+        match key.as_deref() {
+            Some("area") => area = Some(reader.value(cursor, "the area")?),
+            Some(other) => {
+                let message = format!("`{other}=` of a diode is not read");
+                let span = cursor.here(reader);
+                reader.diagnostics.push(Diagnostic::error("E0704", span, message));
+                return None;
+            }
+            // `OFF` is a hint for the operating point.
+            None if cursor.next_word().eq_ignore_ascii_case("off") => {
+                cursor.word();
+            }
+            None if area.is_none() => area = Some(reader.value(cursor, "the area")?),
+            None => break,
+        }
+    }
+    Some(Element::Diode { model, area })
+}
+
+fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {
+    let mut words = vec![];
+    loop {
+        let mut ahead = *cursor;
+        if ahead.key().is_some() {
+            break;
+        }
+        let (word, from) = ahead.node();
+        if word.is_empty() {
+            break;
+        }
+        *cursor = ahead;
+        if word.eq_ignore_ascii_case("params:") {
+            break;
+        }
+        words.push((word, from));
+    }
+    let Some(subcircuit) = words.pop() else {
+        reader.missing(cursor, "the name of the subcircuit");
+        return None;
+    };
+    for (word, _) in words {
+        nodes.push(reader.names.node(word));
+    }
+    let subcircuit = reader.name(subcircuit);
+    let mut parameters = vec![];
+    while let Some(key) = cursor.key() {
+        let value = reader.value(cursor, "the value of the parameter")?;
+        parameters.push((reader.name(key), value));
+    }
+    Some(Element::Instance { subcircuit, parameters })
+}

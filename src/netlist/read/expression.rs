@@ -1,0 +1,269 @@
+//! Expressions of netlists, by the shared grammar with SPICE's leaves.
+
+use super::number;
+use crate::diagnostic::Diagnostic;
+use crate::expr::parse::{self, Language, Role};
+use crate::expr::{self, Dialect, Node, Table};
+use crate::netlist::{Expr, Leaf, Names};
+use crate::source::{FileId, Span};
+use pest::Parser;
+use pest::iterators::Pair;
+use std::sync::Arc;
+
+use grammar::{Grammar, Rule};
+
+#[allow(missing_docs)]
+mod grammar {
+    #[derive(pest_derive::Parser)]
+    #[grammar = "grammar/expression.pest"]
+    #[grammar = "grammar/spice.pest"]
+    pub struct Grammar;
+}
+
+/// Reads an expression that stands at byte `offset` of a file. Errors are pushed.
+pub fn expression(
+    text: &str,
+    names: &mut Names,
+    file: FileId,
+    offset: usize,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Expr> {
+    let place = |from: usize, to: usize| Span::new(file, offset + from, offset + to);
+    if let Some(at) = parse::nesting(text, None) {
+        d.push(parse::too_deep(place(at, at + 1)));
+        return None;
+    }
+    let mut pairs = match Grammar::parse(Rule::whole, text) {
+        Ok(pairs) => pairs,
+        Err(error) => {
+            d.push(syntax_error(text, &error, file, offset));
+            return None;
+        }
+    };
+    let mut language = Spice { names, file, offset };
+    parse::expression(&mut language, pairs.next()?, d)
+}
+
+/// What pest found, in the words of netlists.
+fn syntax_error(
+    text: &str,
+    error: &pest::error::Error<Rule>,
+    file: FileId,
+    offset: usize,
+) -> Diagnostic {
+    let at = match error.location {
+        pest::error::InputLocation::Pos(at) | pest::error::InputLocation::Span((at, _)) => {
+            at.min(text.len())
+        }
+    };
+    let found = text[at..].chars().next();
+    let end = at + found.map_or(0, char::len_utf8);
+    // At the end of the text there is nothing to point at but the last character.
+    let start =
+        if at == end { text[..at].char_indices().next_back().map_or(0, |(k, _)| k) } else { at };
+    let span = Span::new(file, offset + start, offset + end.max(start));
+    let open = text.bytes().filter(|b| *b == b'(').count();
+    let closed = text.bytes().filter(|b| *b == b')').count();
+    let message = match found {
+        None if text.trim().is_empty() => "an expression is missing".to_string(),
+        None if open > closed => "the expression ends before its bracket is closed".to_string(),
+        None => "the expression ends too early".to_string(),
+        Some(_) if closed > open => "a closing bracket without an opening one".to_string(),
+        Some(found) => format!("the expression cannot go on with `{found}`"),
+    };
+    Diagnostic::error("E0705", span, message)
+}
+
+struct Spice<'a> {
+    names: &'a mut Names,
+    file: FileId,
+    offset: usize,
+}
+
+impl Language for Spice<'_> {
+    type Rule = Rule;
+    type Leaf = Leaf;
+    const DIALECT: Dialect = Dialect::Ngspice;
+    expr::roles!(Rule);
+
+    fn span(&self, span: pest::Span<'_>) -> Span {
+        Span::new(self.file, span.start() + self.offset, span.end() + self.offset)
+    }
+
+    fn atom(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
+        let span = self.span(pair.as_span());
+        let node = match pair.as_rule() {
+            Rule::number => {
+                let text = pair.as_str();
+                let read = number::number(text)?;
+                d.extend(super::suffix_warning(text, &read, span));
+                Node::Number(read.value)
+            }
+            Rule::reference => {
+                let text = pair.as_str();
+                if text.eq_ignore_ascii_case("time") {
+                    Node::Leaf(Leaf::Time)
+                } else {
+                    Node::Leaf(Leaf::Parameter(self.names.intern(text)))
+                }
+            }
+            _ => {
+                let inner = pair.into_inner().next()?;
+                let rule = inner.as_rule();
+                let mut parts = inner.into_inner();
+                if rule == Rule::braced {
+                    return parse::expression(self, parts.next()?, d);
+                }
+                let first = parts.next()?.as_str();
+                if rule == Rule::current {
+                    Node::Leaf(Leaf::Current(self.names.intern(first)))
+                } else {
+                    let first = self.names.node(first);
+                    let second = parts.next().map(|node| self.names.node(node.as_str()));
+                    Node::Leaf(Leaf::Voltage(first, second))
+                }
+            }
+        };
+        Some(Expr::new(node, span))
+    }
+
+    /// `table(x, x0, y0, …)` and `pwl(x, x0, y0, …)`.
+    fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
+        let span = self.span(pair.as_span());
+        let folded = name.to_ascii_lowercase();
+        if folded != "table" && folded != "pwl" {
+            d.push(parse::unknown_function(name, span));
+            return None;
+        }
+        let mut arguments = vec![];
+        for part in pair.into_inner().filter(|part| Self::role(part.as_rule()) == Role::Expression)
+        {
+            arguments.push(parse::expression(self, part, d)?);
+        }
+        let mut arguments = arguments.into_iter();
+        let x = arguments.next();
+        let points: Option<Vec<f64>> = arguments.map(|point| point.as_number()).collect();
+        let table = points.and_then(|points| table(&points));
+        match (x, table) {
+            (Some(x), Some(table)) => {
+                // Beyond its ends ngspice's pwl() goes on with its last slopes.
+                let table = if folded == "pwl" { extrapolated(table) } else { table };
+                Some(Expr::new(Node::Table(x, Arc::new(table)), span))
+            }
+            _ => {
+                let message =
+                    format!("`{name}` takes x and pairs of numbers with rising abscissae");
+                d.push(Diagnostic::error("E0706", span, message));
+                None
+            }
+        }
+    }
+}
+
+/// A table of x0, y0, x1, y1, … with rising x.
+pub fn table(points: &[f64]) -> Option<Table> {
+    let rising = points.chunks(2).zip(points.chunks(2).skip(1)).all(|(a, b)| a[0] < b[0]);
+    let finite = points.iter().all(|value| value.is_finite());
+    if points.is_empty() || points.len() % 2 == 1 || !rising || !finite {
+        return None;
+    }
+    let column = |k: usize| points.chunks(2).map(|pair| pair[k]).collect();
+    Some(Table { x: column(0), y: column(1) })
+}
+
+/// The table with its end slopes going on, by a point very far out on either side.
+fn extrapolated(mut table: Table) -> Table {
+    let n = table.x.len();
+    if n < 2 {
+        return table;
+    }
+    let slope = |k: usize| (table.y[k + 1] - table.y[k]) / (table.x[k + 1] - table.x[k]);
+    let (first, last) = (slope(0), slope(n - 2));
+    let far = 1e15 * (table.x[n - 1].abs() + table.x[0].abs());
+    let (before, after) = (table.y[0] - first * far, table.y[n - 1] + last * far);
+    if before.is_finite() && after.is_finite() {
+        table.x.insert(0, table.x[0] - far);
+        table.y.insert(0, before);
+        table.x.push(table.x[n] + far);
+        table.y.push(after);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::{Binary, Function};
+
+    fn read(text: &str) -> (Option<Expr>, Names, Vec<Diagnostic>) {
+        let (mut names, mut d) = (Names::default(), vec![]);
+        let expr = expression(text, &mut names, FileId(0), 0, &mut d);
+        (expr, names, d)
+    }
+
+    fn value(text: &str, x: f64) -> f64 {
+        let (expr, names, d) = read(text);
+        assert!(d.is_empty(), "{text}: {d:?}");
+        expr.unwrap().evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(name) if names.text(*name) == "x" => x,
+            Leaf::Time => 100.0,
+            Leaf::Voltage(a, None) if names.text(*a) == "n+" => 7.0,
+            Leaf::Voltage(a, Some(b)) if names.text(*a) == "a" && names.text(*b) == "x1.b" => 5.0,
+            Leaf::Current(a) if names.text(*a) == "v.x1.v1" => 3.0,
+            other => panic!("{other:?}"),
+        })
+    }
+
+    #[test]
+    fn values_as_ngspice_has_them() {
+        for (text, expected) in [
+            ("1+2*3", 7.0),
+            ("2**3**2", 64.0),
+            ("-2^2", -4.0),
+            ("(-0.3)^3", 0.027),
+            ("pow(-2,3)", 8.0),
+            ("pwr(-2,3)", -8.0),
+            ("x > 1 ? 5 : 6", 5.0),
+            ("x<1?5:x==2?7:8", 7.0),
+            ("(x>1 && x<3) || !x", 1.0),
+            ("u(x)+u(0)+uramp(-1)+sgn(-x)", 0.5),
+            ("V(n+) - v( a , x1.b ) * I(v.x1.v1) + TIME", 7.0 - 15.0 + 100.0),
+            ("{x}*1k+2meg", 2002000.0),
+            ("log(1)+ln(1)+LOG10(100)", 2.0),
+            ("table(x, 0,0, 1,10)", 10.0),
+            ("pwl(x, 0,0, 1,10)", 20.0),
+            ("min(x,max(1,5))", 2.0),
+            ("if(x, 3, 4)", 3.0),
+        ] {
+            assert!((value(text, 2.0) - expected).abs() < 1e-12, "{text} = {}", value(text, 2.0));
+        }
+        assert_eq!(value("pwl(x, 0,0, 1,10)", -1.0), -10.0);
+    }
+
+    #[test]
+    fn powers_are_of_the_magnitude() {
+        let (expr, _, _) = read("x**y");
+        assert!(matches!(*expr.unwrap().node, Node::Call(Function::PowerOfAbs, _)));
+        let (expr, _, _) = read("x*y");
+        assert!(matches!(*expr.unwrap().node, Node::Binary(Binary::Multiply, ..)));
+    }
+
+    #[test]
+    fn errors_point_at_the_place() {
+        for (text, code, at) in [
+            ("1+", "E0705", 1),
+            ("(1+2", "E0705", 3),
+            ("1+2)", "E0705", 3),
+            ("", "E0705", 0),
+            ("1 $ 2", "E0705", 2),
+            ("nosuch(1)", "E0210", 0),
+            ("table(x, 1, 2, 0, 3)", "E0706", 0),
+        ] {
+            let (expr, _, d) = read(text);
+            assert!(expr.is_none(), "{text}");
+            assert_eq!((d[0].code, d[0].labels[0].span.start), (code, at), "{text}: {d:?}");
+        }
+        assert_eq!(read(&"(".repeat(100_000)).2[0].code, "E0110");
+        assert!(read(&("x".to_string() + &"+x".repeat(10_000))).0.is_some());
+    }
+}
