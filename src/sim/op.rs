@@ -109,8 +109,15 @@ pub(crate) fn operating_point(
                 Err(Cut::Singular(singular)) => {
                     let n = network.system.equations() as u32;
                     let before = held.iter().filter(|h| **h).count();
+                    // A storage whose value is open (its unknowns are in a null vector) and whose rate would satisfy
+                    // the equations that contradict each other (its row is in a null vector of the transpose).
                     for row in singular.rows.iter().flatten().filter(|row| **row >= n) {
-                        held[(row - n) as usize] = true;
+                        let k = (row - n) as usize;
+                        let open = |unknown: usize| {
+                            singular.columns.iter().any(|set| set.contains(&(unknown as u32)))
+                        };
+                        held[k] |= network.system.charges.row(k).any(|(unknown, _)| open(unknown));
+                        held[k] |= network.system.curved[k];
                     }
                     if held.iter().filter(|h| **h).count() == before {
                         return Err(Cut::Singular(singular));

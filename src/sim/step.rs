@@ -273,8 +273,11 @@ impl<'a> Run<'a> {
         let mut outcome = Err(Cut::NoConvergence { worst: 0 });
         for shrink in [1.0, 1e-2, 1e-4] {
             self.state.copy_from(&start);
-            outcome = self.euler(full * shrink).and_then(|()| self.euler(full * shrink));
+            outcome = self.euler(full * shrink);
+            let first = self.state.clone();
+            outcome = outcome.and_then(|()| self.euler(full * shrink));
             if outcome.is_ok() {
+                self.extrapolate(start.t, &first);
                 return Ok(());
             }
         }
@@ -284,6 +287,21 @@ impl<'a> Run<'a> {
                 let network = &self.network;
                 let trouble = Trouble::Cut(cut);
                 Err(failure(network.system, moment, start.t, &trouble, &network.statistics))
+            }
+        }
+    }
+
+    /// Takes the values of two short steps back to where they began, on a straight line; what the first one's impulse
+    /// has spoilt stays as after the second.
+    fn extrapolate(&mut self, t: f64, first: &State) {
+        let state = &mut self.state;
+        state.t = t;
+        for (q, first) in state.q.iter_mut().zip(&first.q) {
+            *q = 2.0 * first - *q;
+        }
+        for ((x, first), untested) in state.x.iter_mut().zip(&first.x).zip(&self.untested) {
+            if !untested {
+                *x = 2.0 * first - *x;
             }
         }
     }

@@ -140,3 +140,447 @@ fn rc_charges() {
         assert!(error < 1e-3 * bound, "current {error} at {reltol}: {statistics}");
     }
 }
+
+#[test]
+fn lc_keeps_its_energy_and_phase() {
+    let parts = vec![("L1", vec![1, 0], l(1e-3, 0.0)), ("C1", vec![1, 0], c(1e-6, 1.0))];
+    let system = system(parts);
+    let omega = 1.0 / (1e-9f64).sqrt();
+    let stop = 20.0 * TAU / omega;
+    let (trace, statistics) = run(&system, &grid(stop, stop / 400.0, 1e-8));
+    let error = worst(&trace, "v(1)", |t| (omega * t).cos());
+    assert!(error < 1e-6, "{error}: {statistics}");
+    let (v, i) = (column(&trace, "v(1)"), column(&trace, "i(l1)"));
+    for (v, i) in v.iter().zip(i) {
+        assert!((0.5e-6 * v * v + 0.5e-3 * i * i - 0.5e-6).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn rlc_rings_as_the_closed_form_says() {
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("R1", vec![1, 2], r(20.0)),
+        ("L1", vec![2, 3], l(1e-3, 0.0)),
+        ("C1", vec![3, 0], c(1e-6, 0.0)),
+    ]);
+    let (alpha, omega0) = (20.0 / 2e-3, 1.0 / (1e-9f64).sqrt());
+    let omega = (omega0 * omega0 - alpha * alpha).sqrt();
+    let exact =
+        |t: f64| 1.0 - (-alpha * t).exp() * ((omega * t).cos() + alpha / omega * (omega * t).sin());
+    for (method, reltol, bound) in [
+        (Method::Auto, 1e-8, 1e-7),
+        (Method::Rodas4, 1e-8, 1e-7),
+        (Method::TrBdf2, 1e-6, 1e-4),
+        (Method::Trapezoidal, 1e-6, 1e-4),
+        (Method::Gear2, 1e-6, 3e-4),
+    ] {
+        let settings = Settings { method, ..grid(1e-3, 1e-5, reltol) };
+        let (trace, statistics) = run(&system, &settings);
+        let error = worst(&trace, "v(3)", exact);
+        assert!(error < bound, "{method:?}: {error}: {statistics}");
+    }
+}
+
+#[test]
+fn coupled_inductors_follow_their_two_modes() {
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("R1", vec![1, 2], r(1.0)),
+        ("L1", vec![2, 0], l(1.0, 0.0)),
+        ("R2", vec![3, 0], r(1.0)),
+        ("L2", vec![3, 0], l(1.0, 0.0)),
+        ("K1", vec![], DeviceKind::Mutual { inductors: [DeviceId(2), DeviceId(4)], coupling: 0.5 }),
+    ]);
+    let (trace, _) = run(&system, &grid(5.0, 0.1, 1e-8));
+    let mode = |t: f64, m: f64| 1.0 - (-t / m).exp();
+    let exact = |t: f64, sign: f64| 0.5 * (mode(t, 1.5) + sign * mode(t, 0.5));
+    assert!(worst(&trace, "i(l1)", |t| exact(t, 1.0)) < 1e-7);
+    assert!(worst(&trace, "i(l2)", |t| exact(t, -1.0)) < 1e-7);
+}
+
+/// Steps of one size: the error test lets everything pass.
+fn fixed(method: Method, stop: f64, h: f64) -> Settings {
+    Settings {
+        method,
+        hmax: Some(h),
+        h0: Some(h),
+        abstol: 1e9,
+        vntol: 1e9,
+        tolerance: Tolerance::Spice,
+        rows: Interval::Times(vec![stop]),
+        ..Settings::new(stop)
+    }
+}
+
+/// The error at the end for two step sizes.
+fn errors_at(
+    system: &System,
+    name: &str,
+    exact: f64,
+    method: Method,
+    stop: f64,
+    steps: [f64; 2],
+) -> [f64; 2] {
+    steps.map(|count| {
+        // Newton's iterations must not hide behind the loose tolerance: a few more digits cost nothing here.
+        let (trace, _) = run(system, &fixed(method, stop, stop / count));
+        (column(&trace, name)[0] - exact).abs()
+    })
+}
+
+fn order(errors: [f64; 2]) -> f64 {
+    (errors[0] / errors[1]).log2()
+}
+
+/// y = 2 + sin t, x = y + y³, x' = cos t·(1 + 3·y²), with y as an algebraic unknown.
+fn algebraic() -> System {
+    let cube = |e: fn() -> Expr| times(e(), times(e(), e()));
+    let y = || volt(2, 0);
+    let rate = times(
+        call(Function::Cos, time()),
+        plus(Expr::number(1.0), times(Expr::number(3.0), times(y(), y()))),
+    );
+    let balance = plus(cube(y), volt(1, 0).negate());
+    system(vec![
+        ("C1", vec![1, 0], c(1.0, 10.0)),
+        ("B1", vec![0, 1], DeviceKind::BehaviouralCurrent { law: rate }),
+        ("R1", vec![2, 0], r(1.0)),
+        ("B2", vec![2, 0], DeviceKind::BehaviouralCurrent { law: balance }),
+    ])
+}
+
+#[test]
+fn orders_of_convergence_on_an_algebraic_system() {
+    let system = algebraic();
+    let exact = 2.0 + 1f64.sin();
+    for (method, steps, expected) in [
+        (Method::Rodas4, [64.0, 128.0], 4.0),
+        (Method::Rodas5p, [32.0, 64.0], 5.0),
+        (Method::TrBdf2, [32.0, 64.0], 2.0),
+        (Method::Trapezoidal, [32.0, 64.0], 2.0),
+        (Method::Gear2, [32.0, 64.0], 2.0),
+    ] {
+        for (name, exact) in [("v(2)", exact), ("v(1)", exact + exact.powi(3))] {
+            let errors = errors_at(&system, name, exact, method, 1.0, steps);
+            let found = order(errors);
+            assert!((found - expected).abs() < 0.5, "{method:?} {name}: {found} from {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn orders_of_convergence_on_prothero_and_robinsons_problem() {
+    // x' = −λ·(x − cos t) − sin t, x = cos t, λ = 1e6: errors of order h³/λ.
+    let pull = times(Expr::number(1e6), plus(volt(1, 0), call(Function::Cos, time()).negate()));
+    let law = plus(pull, call(Function::Sin, time()));
+    let system = system(vec![
+        ("C1", vec![1, 0], c(1.0, 1.0)),
+        ("B1", vec![1, 0], DeviceKind::BehaviouralCurrent { law }),
+    ]);
+    for (method, steps, least) in [
+        (Method::Rodas4, [8.0, 16.0], 2.8),
+        (Method::Rodas5p, [8.0, 16.0], 2.8),
+        (Method::TrBdf2, [8.0, 16.0], 1.8),
+    ] {
+        let errors = errors_at(&system, "v(1)", 1f64.cos(), method, 1.0, steps);
+        let found = order(errors);
+        assert!(found > least, "{method:?}: {found} from {errors:?}");
+    }
+}
+
+#[test]
+fn orders_of_convergence_with_a_charge_that_is_not_linear() {
+    use crate::circuit::stamps::{Charge, Law, LawStamp, Leaf, Unknown, UnknownId};
+    // d/dt (v + v³) = cos t·(1 + 3·v²), v = 2 + sin t.
+    let v = || Law::leaf(Leaf::Unknown(UnknownId(0)));
+    let mul = |a: Law, b: Law| a.binary(Binary::Multiply, b);
+    let add = |a: Law, b: Law| a.binary(Binary::Add, b);
+    let slope = add(Law::number(1.0), mul(Law::number(3.0), mul(v(), v())));
+    let rate = mul(Law::call(Function::Cos, vec![Law::leaf(Leaf::Time)]), slope);
+    let stamps = Stamps {
+        unknowns: vec![Unknown {
+            name: "v(1)".into(),
+            voltage: true,
+            nominal: None,
+            device: None,
+            span: Span::NONE,
+        }],
+        nodes: 1,
+        charges: vec![Charge {
+            device: DeviceId(0),
+            linear: vec![(UnknownId(0), 1.0)],
+            law: Some(mul(v(), mul(v(), v()))),
+            into: vec![(UnknownId(0), 1.0)],
+            initial: Some(10.0),
+        }],
+        laws: vec![LawStamp {
+            device: DeviceId(1),
+            law: rate,
+            into: vec![(UnknownId(0), -1.0)],
+            junction: None,
+        }],
+        ..Stamps::default()
+    };
+    let system = compile(&stamps, &mut vec![]).unwrap();
+    for (method, steps, expected) in [
+        (Method::Rodas4, [64.0, 128.0], 4.0),
+        (Method::Rodas5p, [32.0, 64.0], 5.0),
+        (Method::TrBdf2, [32.0, 64.0], 2.0),
+        (Method::Gear2, [32.0, 64.0], 2.0),
+    ] {
+        let errors = errors_at(&system, "v(1)", 2.0 + 1f64.sin(), method, 1.0, steps);
+        let found = order(errors);
+        assert!((found - expected).abs() < 0.5, "{method:?}: {found} from {errors:?}");
+    }
+    // And with error control, at rows between the steps.
+    let (trace, statistics) = run(&system, &grid(1.0, 0.01, 1e-8));
+    let error = worst(&trace, "v(1)", |t| 2.0 + t.sin());
+    assert!(error < 1e-7, "{error}: {statistics}");
+}
+
+#[test]
+fn rows_between_steps_are_as_good_as_the_steps() {
+    let system = algebraic();
+    for (method, reltol, bound) in
+        [(Method::Rodas5p, 1e-7, 1e-6), (Method::Rodas4, 1e-7, 1e-6), (Method::TrBdf2, 1e-6, 1e-4)]
+    {
+        let settings = Settings { method, ..grid(3.0, 1e-3, reltol) };
+        let (trace, statistics) = run(&system, &settings);
+        assert_eq!(trace.columns[0].len(), 3001);
+        let error = worst(&trace, "v(2)", |t| 2.0 + t.sin());
+        assert!(error < bound, "{method:?}: {error}: {statistics}");
+        assert!(statistics.accepted < 1500, "{statistics}");
+        // Algebraic relations hold in every row, to rounding.
+        let (x, y) = (column(&trace, "v(1)"), column(&trace, "v(2)"));
+        for (x, y) in x.iter().zip(y) {
+            assert!((y + y * y * y - x).abs() < 3e-8 * x, "{y} {x}");
+        }
+    }
+}
+
+#[test]
+fn corners_and_jumps_are_landed_on() {
+    let wave = Waveform::Pwl(vec![(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (2.0, 2.0), (3.0, 0.0)]);
+    let system = system(vec![
+        ("V1", vec![1, 0], v(wave)),
+        ("R1", vec![1, 2], r(1.0)),
+        ("C1", vec![2, 0], c(1.0, 0.0)),
+    ]);
+    let exact = |t: f64| {
+        let jump = if t < 1.0 { 0.0 } else { -2.0 * (-(t - 1.0)).exp_m1() };
+        let s = (t - 2.0).max(0.0);
+        let fall = |s: f64| -2.0 * (s + (-s).exp_m1());
+        jump + fall(s) - fall((t - 3.0).max(0.0))
+    };
+    let (trace, statistics) = run(&system, &grid(4.0, 0.25, 1e-8));
+    assert!(worst(&trace, "v(2)", exact) < 1e-7, "{statistics}");
+    assert_eq!(statistics.corners, 3);
+    // A row at a jump holds the value after it.
+    let (source, at) = (column(&trace, "v(1)"), 4);
+    assert_eq!((trace.columns[0][at], source[at - 1], source[at]), (1.0, 0.0, 2.0));
+    // Without a grid there are both sides.
+    let (trace, statistics) = run(&system, &Settings { reltol: 1e-4, ..Settings::new(4.0) });
+    let times = &trace.columns[0];
+    let jump = times.windows(2).position(|pair| pair[0] == pair[1]).expect("two rows at the jump");
+    let source = column(&trace, "v(1)");
+    assert_eq!((times[jump], source[jump], source[jump + 1]), (1.0, 0.0, 2.0));
+    assert!(times.contains(&2.0) && times.contains(&3.0));
+    // Straight lines between the rows stay within tolerance.
+    let values = column(&trace, "v(2)");
+    for k in 1..times.len() {
+        if times[k] > times[k - 1] {
+            let middle = 0.5 * (times[k] + times[k - 1]);
+            let error = (0.5 * (values[k] + values[k - 1]) - exact(middle)).abs();
+            assert!(error < 5e-4, "{error} at {middle}: {statistics}");
+        }
+    }
+}
+
+#[test]
+fn the_operating_point_of_a_diode() {
+    let thermal = 0.0258563;
+    let model = DiodeModel {
+        saturation_current: 1e-12,
+        emission: thermal / crate::circuit::devices::diode::THERMAL_VOLTAGE,
+        series_resistance: 0.0,
+        junction_capacitance: 0.0,
+        junction_potential: 1.0,
+        grading: 0.5,
+        transit_time: 0.0,
+        forward_bias_depletion: 0.5,
+        breakdown_voltage: None,
+        breakdown_current: 1e-3,
+    };
+    let exponential = call(Function::Exp, times(volt(2, 0), Expr::number(1.0 / thermal)));
+    let law = times(Expr::number(1e-12), plus(exponential, Expr::number(-1.0)));
+    let diode = DeviceKind::Diode { model, area: 1.0 };
+    for (name, device) in [("D1", diode), ("B1", DeviceKind::BehaviouralCurrent { law })] {
+        let system = system(vec![
+            ("V1", vec![1, 0], dc(1.0)),
+            ("R1", vec![1, 2], r(1e3)),
+            (name, vec![2, 0], device),
+        ]);
+        let point = operating_point(&system).unwrap_or_else(|f| panic!("{:?}", f.diagnostic));
+        assert!((point.unknowns[1] - 0.517009824).abs() < 1e-9, "{}", point.unknowns[1]);
+        assert!((point.unknowns[2] + 4.82990176e-4).abs() < 1e-12, "{}", point.unknowns[2]);
+    }
+}
+
+#[test]
+fn an_operating_point_holds_storages_that_nothing_determines() {
+    // An integrator without feedback keeps its initial value; the rest is at rest.
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(2.0)),
+        ("R1", vec![1, 2], r(1.0)),
+        ("C1", vec![2, 0], c(1.0, 0.0)),
+        ("G1", vec![0, 3], DeviceKind::Vccs { gain: 1.0, control: [NodeId(2), NodeId(0)] }),
+        ("C2", vec![3, 0], c(1.0, 0.5)),
+    ]);
+    let point = operating_point(&system).unwrap();
+    assert!((point.unknowns[1] - 2.0).abs() < 1e-12);
+    assert!((point.unknowns[2] - 0.5).abs() < 1e-12);
+    // The run starts there: v(2) stays, v(3) rises by 2 V/s.
+    let settings = Settings { uic: false, ..grid(1.0, 0.5, 1e-6) };
+    let (trace, _) = run(&system, &settings);
+    assert!(worst(&trace, "v(2)", |_| 2.0) < 1e-9);
+    assert!(worst(&trace, "v(3)", |t| 0.5 + 2.0 * t) < 1e-6);
+}
+
+#[test]
+fn a_loop_of_capacitors_and_a_source_is_redistributed() {
+    // C1 across the source, C2 behind a resistor: index 2, and C1's initial value is not the source's.
+    let system = system(vec![
+        ("V1", vec![1, 0], v(sine(1.0, 1.0))),
+        ("C1", vec![1, 0], c(1.0, 5.0)),
+        ("R1", vec![1, 2], r(1.0)),
+        ("C2", vec![2, 0], c(0.1, 0.0)),
+    ]);
+    let (trace, statistics) = run(&system, &grid(2.0, 0.1, 1e-6));
+    assert_eq!(statistics.method, "trbdf2");
+    assert!(worst(&trace, "v(1)", |t| (TAU * t).sin()) < 1e-5);
+    // i(V1) = −(C1·dv/dt + (v1 − v2)/R), away from the start, which is an impulse.
+    let (times, v1) = (&trace.columns[0], column(&trace, "v(1)"));
+    let (v2, i) = (column(&trace, "v(2)"), column(&trace, "i(v1)"));
+    for k in 1..times.len() {
+        let exact = -(TAU * (TAU * times[k]).cos() + v1[k] - v2[k]);
+        assert!((i[k] - exact).abs() < 2e-2, "{} {exact} at {}", i[k], times[k]);
+    }
+}
+
+#[test]
+fn switches_flip_where_their_control_crosses() {
+    // A relaxation oscillator: the switch discharges C above 2 V until 1 V.
+    let switch = DeviceKind::Switch {
+        control: volt(2, 0),
+        on: 2.0,
+        off: 1.0,
+        on_resistance: 10.0,
+        off_resistance: 1e15,
+        initially_on: None,
+    };
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(3.0)),
+        ("R1", vec![1, 2], r(1e3)),
+        ("C1", vec![2, 0], c(1e-6, 1.0)),
+        ("S1", vec![2, 0], switch),
+    ]);
+    // Off: towards 3 V with 1 ms; on: towards 3·10/1010 V with 1 ms·10/1010.
+    let rise = 1e-3 * (2.0f64 / 1.0).ln();
+    let low: f64 = 3.0 * 10.0 / 1010.0;
+    let fall = 1e-3 * 10.0 / 1010.0 * ((2.0 - low) / (1.0 - low)).ln();
+    let period = rise + fall;
+    let stop = 10.5 * period;
+    let (trace, statistics) = run(&system, &grid(stop, period / 100.0, 1e-8));
+    assert_eq!(statistics.events, 20, "{statistics}");
+    let exact = |t: f64| {
+        let s = t - (t / period).floor() * period;
+        if s < rise {
+            3.0 - 2.0 * (-s / 1e-3).exp()
+        } else {
+            low + (2.0 - low) * (-(s - rise) * 1010.0 / 10.0 / 1e-3).exp()
+        }
+    };
+    assert!(worst(&trace, "v(2)", exact) < 1e-5, "{statistics}");
+}
+
+#[test]
+fn a_switch_that_contradicts_itself_is_named() {
+    // Closing takes the control away at once: 5 V open, 0.05 V closed, no hysteresis to speak of.
+    let switch = DeviceKind::Switch {
+        control: volt(2, 0),
+        on: 2.5,
+        off: 2.5,
+        on_resistance: 10.0,
+        off_resistance: 1e9,
+        initially_on: None,
+    };
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(5.0)),
+        ("R1", vec![1, 2], r(1e3)),
+        ("S1", vec![2, 0], switch),
+    ]);
+    let failure = transient(&system, &Settings::new(1.0), &mut trace(&system)).unwrap_err();
+    assert_eq!(failure.diagnostic.code, "E0804");
+    assert_eq!(failure.kind, FailureKind::NotSolved);
+}
+
+#[test]
+fn floating_nodes_and_loops_of_sources_are_named() {
+    let found = errors(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("R1", vec![1, 0], r(1.0)),
+        ("R2", vec![2, 3], r(1.0)),
+    ]);
+    assert_eq!(found[0].code, "E0780");
+    assert!(found[0].message.contains("v(2), v(3)"), "{}", found[0].message);
+    let found = errors(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("V2", vec![1, 0], dc(2.0)),
+        ("R1", vec![1, 0], r(1.0)),
+    ]);
+    assert_eq!(found[0].code, "E0781");
+    assert!(found[0].message.contains("V1") && found[0].message.contains("V2"), "{found:?}");
+    let found = errors(vec![(
+        "I1",
+        vec![0, 1],
+        DeviceKind::CurrentSource { waveform: Waveform::Constant(1.0) },
+    )]);
+    assert_eq!(found[0].code, "E0780");
+}
+
+#[test]
+fn what_is_no_number_is_said_with_its_device() {
+    // √(1 − t·v) ends at t = 1.
+    let root = call(Function::Sqrt, plus(Expr::number(1.0), time().negate()));
+    let system = system(vec![
+        ("B1", vec![1, 0], DeviceKind::BehaviouralVoltage { law: root }),
+        ("R1", vec![1, 2], r(1.0)),
+        ("C1", vec![2, 0], c(1.0, 0.0)),
+    ]);
+    let failure = transient(&system, &Settings::new(2.0), &mut trace(&system)).unwrap_err();
+    assert!(["E0802", "E0803"].contains(&failure.diagnostic.code), "{:?}", failure.diagnostic);
+    assert!((failure.time - 1.0).abs() < 1e-6, "{}", failure.time);
+    assert!(failure.statistics.rejected.total() > 0);
+}
+
+#[test]
+fn counters_are_the_same_every_time() {
+    let system = algebraic();
+    let settings = grid(2.0, 0.1, 1e-5);
+    let (first, statistics) = run(&system, &settings);
+    let (second, again) = run(&system, &settings);
+    assert_eq!(statistics, again);
+    assert_eq!(first, second);
+    assert_eq!(statistics.to_json()["schema"], 1);
+    assert_eq!(statistics.to_json()["accepted"], statistics.accepted);
+}
+
+#[test]
+fn an_interrupt_ends_the_run() {
+    let system = algebraic();
+    let flag = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
+    let settings = Settings { interrupt: Some(flag), ..Settings::new(1.0) };
+    let failure = transient(&system, &settings, &mut trace(&system)).unwrap_err();
+    assert_eq!(failure.kind, FailureKind::Interrupted);
+}
