@@ -15,6 +15,8 @@
 //!
 //! Keys other than `hmax` and `grid` repeat. Unknown keys are skipped: a newer version may have written them.
 
+use crate::expr::print::number;
+
 /// A domain with more variables than fit into a value this long goes on in another line of its own.
 const DOMAIN_WIDTH: usize = 60;
 
@@ -83,20 +85,21 @@ impl Header {
             push("hmax", "auto".to_string());
         }
         if let Some(grid) = self.grid {
-            push("grid", format!("{grid:?}"));
+            push("grid", number(grid));
         }
         for (key, value) in &self.options {
             push("option", format!("{key}={value}"));
         }
         for jumps in &self.jumps {
             let mut words = vec![jumps.device.clone()];
-            words.extend(jumps.times.iter().map(|time| format!("{time:?}")));
+            words.extend(jumps.times.iter().map(|time| number(*time)));
             words.extend(jumps.rise.then(|| "rise".to_string()));
             words.extend(jumps.fall.then(|| "fall".to_string()));
             push("jump", words.join(" "));
         }
         for domain in &self.domains {
-            let begin = format!("{} {:?} {:?}", domain.domain, domain.effort, domain.flow);
+            let begin =
+                format!("{} {} {}", domain.domain, number(domain.effort), number(domain.flow));
             let nodes = domain.nodes.iter().map(|node| format!("v({node})"));
             let devices = domain.devices.iter().map(|device| format!("i({device})"));
             let mut line = begin.clone();

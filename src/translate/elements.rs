@@ -6,7 +6,7 @@ use super::forms::{Form, Integrator, SourceValue, constant_value, expressions};
 use super::map::Link;
 use super::names::Namer;
 use super::series_parallel::Item;
-use super::values::{Speaker, Unreadable, negate, product};
+use super::values::{Speaker, Unreadable, negate, product, signed, tidy};
 use crate::bond::graph::{
     self, BondGraph, BondId, End, Initial, Law, Leaf, SignalLaw, StoreInitial, StoreLaw, Variable,
     VertexId,
@@ -107,7 +107,12 @@ impl Builder<'_> {
         let sense = self.flows.senses.iter().find(|sense| sense.bond == bond).map(|s| s.device);
         if let Some(device) = sense {
             let nodes = points.map(|point| self.node(point));
-            let what = format!("0 V, carries f({})", self.graph.bond_name(bond));
+            let ends = [self.graph.bond(bond).from.vertex, self.graph.bond(bond).to.vertex];
+            let series = ends.into_iter().find(|id| matches!(self.graph.vertex(*id).law, Law::One));
+            let what = match series {
+                Some(junction) => format!("0 V, carries f({})", self.graph.vertex(junction).name),
+                None => format!("0 V, carries f({})", self.graph.bond_name(bond)),
+            };
             let span = self.graph.bond(bond).span;
             let value = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)));
             self.device(device, nodes, value, span, &what);
@@ -260,24 +265,23 @@ impl Builder<'_> {
                 let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
                 let modulus = law(self, modulus)?;
                 let what = format!("{what}.{}", port + 1);
-                let (device, element) = if port == *lead {
+                let (device, nodes, element) = if port == *lead {
                     let element = if *modulated {
-                        let law = product(modulus, self.voltage(other));
+                        let law = tidy(product(modulus, self.voltage(other)));
                         Element::BehaviouralVoltage { law }
                     } else {
                         Element::Vcvs { gain: modulus, control: other }
                     };
-                    (*effort, element)
+                    (*effort, nodes, element)
                 } else {
-                    // What flows into the leading port flows out of this one, m times.
+                    // What flows into the leading port's + flows out of this one's, m times.
                     let current = self.current(Carrier { device: *effort, negated: false });
                     let element = if *modulated {
-                        let law = negate(product(modulus, current));
-                        Element::BehaviouralCurrent { law }
+                        Element::BehaviouralCurrent { law: tidy(product(modulus, current)) }
                     } else {
-                        Element::Cccs { gain: negate(modulus), control: *effort }
+                        Element::Cccs { gain: modulus, control: *effort }
                     };
-                    (*flow, element)
+                    (*flow, [nodes[1], nodes[0]], element)
                 };
                 self.device(device, nodes, element, span, &what);
             }
@@ -291,8 +295,8 @@ impl Builder<'_> {
                 let element = if *modulated {
                     let flow = self.inflow(id, 1 - end.port, far, speaker);
                     let flow = flow.unwrap_or_else(|| Expr::number(f64::NAN));
-                    let law = product(modulus, flow);
-                    Element::BehaviouralVoltage { law: if port == 0 { negate(law) } else { law } }
+                    let law = tidy(signed(product(modulus, flow), port == 0));
+                    Element::BehaviouralVoltage { law }
                 } else {
                     let Some(carrier) = self.flows.carrier(far, None) else { return Ok(()) };
                     let negative = carrier.negated ^ outward ^ (port == 0);
@@ -305,10 +309,10 @@ impl Builder<'_> {
                 // f1 = g·e2 into port 1, f2 = g·e1 out of port 2.
                 let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
                 let modulus = law(self, modulus)?;
-                let modulus = if port == 1 { negate(modulus) } else { modulus };
+                let nodes = if port == 1 { [nodes[1], nodes[0]] } else { nodes };
                 let what = format!("{what}.{}", port + 1);
                 let element = if *modulated {
-                    let law = product(modulus, self.voltage(other));
+                    let law = tidy(product(modulus, self.voltage(other)));
                     Element::BehaviouralCurrent { law }
                 } else {
                     Element::Vccs { gain: modulus, control: other }

@@ -132,7 +132,7 @@ impl Builder<'_> {
                 }
                 jumps.times.push(value(at));
                 let start = self.constant(at);
-                let end = start.clone().binary(Binary::Add, Expr::number(rise));
+                let end = later(start.clone(), rise);
                 let [low, high] = [before, after].map(|expr| self.constant(expr));
                 let arguments = vec![Expr::number(0.0), low.clone(), start, low, end, high];
                 (Shape::Pwl, arguments)
@@ -185,7 +185,7 @@ impl Builder<'_> {
                     let time = match before {
                         Some((earlier, _)) if value(earlier) == value(time) => {
                             jumps.times.push(value(time));
-                            start.binary(Binary::Add, Expr::number(rise))
+                            later(start, rise)
                         }
                         _ => start,
                     };
@@ -199,5 +199,13 @@ impl Builder<'_> {
         }
         let (shape, arguments) = function;
         netlist::Waveform::Function { shape, arguments }
+    }
+}
+
+/// A time a little later.
+fn later(time: Expr, by: f64) -> Expr {
+    match time.as_number() {
+        Some(value) => Expr::number(value + by),
+        None => time.binary(Binary::Add, Expr::number(by)),
     }
 }
