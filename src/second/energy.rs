@@ -50,7 +50,8 @@ pub struct Energy {
     pub modulated: f64,
     /// delivered − dissipated − stored − modulated.
     pub residual: f64,
-    /// What the residual is to be compared with: Σ |delivered| of the sources, or the largest other sum.
+    /// What the residual is to be compared with: Σ |delivered| of the sources, or the largest other sum; at least a
+    /// thousandth of all that was moved to and fro, for what swings by itself.
     pub turnover: f64,
     /// Largest |Σ power| of a junction or two-port at a row, in parts of its own largest Σ |power|; and its name.
     pub junctions: (f64, String),
@@ -61,11 +62,12 @@ pub fn carries_power(graph: &BondGraph, bond: BondId) -> bool {
     !matches!(graph.bond(bond).domain, Domain::PseudoThermal | Domain::Pneumatic)
 }
 
-/// The balance, from the work of every bond and the unknowns at both ends of the run.
+/// The balance, from the work of every bond, ∫ |e·f| dt over all, and the unknowns at both ends of the run.
 pub fn balance(
     graph: &BondGraph,
     equations: &Equations,
     work: &[f64],
+    moved: f64,
     start: &[f64],
     end: &[f64],
 ) -> Energy {
@@ -101,9 +103,8 @@ pub fn balance(
     let sum = |role: Role| -> f64 {
         energy.shares.iter().filter(|s| s.role == role).map(|s| s.energy.abs()).sum()
     };
-    energy.turnover = [sources, sum(Role::Stored), sum(Role::Dissipated), sum(Role::Modulated)]
-        .into_iter()
-        .fold(0.0, f64::max);
+    let sums = [sources, sum(Role::Stored), sum(Role::Dissipated), sum(Role::Modulated)];
+    energy.turnover = sums.into_iter().fold(1e-3 * moved, f64::max);
     energy
 }
 
@@ -199,6 +200,8 @@ fn integral(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
 pub struct Meter {
     /// ∫ e·f dt of each bond.
     pub work: Vec<f64>,
+    /// ∫ |e·f| dt over all bonds.
+    pub moved: f64,
     columns: Vec<(usize, usize)>,
     /// By vertex: signed bonds into it, for junctions and two-ports.
     nodes: Vec<(VertexId, Vec<(usize, f64)>)>,
@@ -227,6 +230,7 @@ impl Meter {
             .collect();
         Meter {
             work: vec![0.0; graph.bonds.len()],
+            moved: 0.0,
             columns: graph
                 .bond_ids()
                 .map(|bond| {
@@ -241,7 +245,9 @@ impl Meter {
     /// Adds `weight`·e·f of every bond.
     pub fn add(&mut self, weight: f64, y: &[f64]) {
         for (work, (e, f)) in self.work.iter_mut().zip(&self.columns) {
-            *work += weight * y[*e] * y[*f];
+            let part = weight * y[*e] * y[*f];
+            *work += part;
+            self.moved += part.abs();
         }
     }
 

@@ -155,7 +155,8 @@ pub fn integrate(
     for ((least, formula), factor) in run.least[1..].iter_mut().zip(&formulas).zip(&factors) {
         *least = sizes.least(formula) / factor;
     }
-    run.energy = energy::balance(graph, &prepared.equations, &meter.work, &start, &end);
+    run.energy =
+        energy::balance(graph, &prepared.equations, &meter.work, meter.moved, &start, &end);
     run.energy.junctions = meter.worst(graph);
     Some(run)
 }

@@ -4,9 +4,8 @@ use super::Builder;
 use super::names::Renamed;
 use super::values::Speaker;
 use crate::bond::graph::{BondId, Law, Power, SignalOrigin, Storage};
-use crate::expr::Node;
 use crate::netlist::write::expression;
-use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
+use crate::netlist::{CardKind, Expr, Names};
 use crate::quantity::Domain;
 
 /// The map of a translation.
@@ -18,8 +17,6 @@ pub struct Map {
     pub variables: Vec<Variable>,
     /// Devices and where they come from, in the order of the netlist.
     pub cards: Vec<MapCard>,
-    /// Parameters and their values in SI.
-    pub parameters: Vec<(Name, f64)>,
     /// Names that SPICE would not take, or not tell apart.
     pub renamed: Vec<Renamed>,
     /// How much circuit it took.
@@ -81,24 +78,13 @@ pub struct Link {
 impl Map {
     /// The map as JSON, schema 1.
     pub fn json(&self, names: &Names) -> serde_json::Value {
-        // A result holds no parameters: they stand here as numbers.
-        let value = |expr: &Expr| {
-            expr.map(&mut |leaf, span| match leaf {
-                Leaf::Parameter(name) => match self.parameters.iter().find(|(p, _)| p == name) {
-                    Some((_, value)) => Expr::new(Node::Number(*value), span),
-                    None => Expr::leaf(leaf.clone()),
-                },
-                leaf => Expr::leaf(leaf.clone()),
-            })
-        };
         let variables: Vec<_> = self
             .variables
             .iter()
-            .filter_map(|variable| Some((variable, variable.expr.as_ref()?)))
-            .map(|(variable, expr)| {
+            .map(|variable| {
                 serde_json::json!({
                     "bg": variable.bg,
-                    "expr": expression(names, &value(expr)),
+                    "expr": variable.expr.as_ref().map(|expr| expression(names, expr)),
                     "factor": variable.factor,
                     "unit": variable.unit,
                     "domain": variable.domain.name(),
@@ -157,9 +143,7 @@ impl Builder<'_> {
             helpers: self.flows.senses.len() + self.couplers,
         };
         let renamed = self.namer.renamed.clone();
-        let values = self.graph.parameters.iter().map(|parameter| parameter.value);
-        let parameters = self.parameters.iter().copied().zip(values).collect();
-        Map { dialect: "ngspice", variables, cards, parameters, renamed, figures }
+        Map { dialect: "ngspice", variables, cards, renamed, figures }
     }
 
     fn observed(&self) -> Vec<Variable> {
