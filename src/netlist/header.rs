@@ -15,6 +15,11 @@
 //!
 //! Keys other than `hmax` and `grid` repeat. Unknown keys are skipped: a newer version may have written them.
 
+use crate::expr::print::number;
+
+/// A domain with more variables than fit into a value this long goes on in another line of its own.
+const DOMAIN_WIDTH: usize = 60;
+
 /// The header, typed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
@@ -80,27 +85,32 @@ impl Header {
             push("hmax", "auto".to_string());
         }
         if let Some(grid) = self.grid {
-            push("grid", format!("{grid:?}"));
+            push("grid", number(grid));
         }
         for (key, value) in &self.options {
             push("option", format!("{key}={value}"));
         }
         for jumps in &self.jumps {
             let mut words = vec![jumps.device.clone()];
-            words.extend(jumps.times.iter().map(|time| format!("{time:?}")));
+            words.extend(jumps.times.iter().map(|time| number(*time)));
             words.extend(jumps.rise.then(|| "rise".to_string()));
             words.extend(jumps.fall.then(|| "fall".to_string()));
             push("jump", words.join(" "));
         }
         for domain in &self.domains {
-            let mut words = vec![
-                domain.domain.clone(),
-                format!("{:?}", domain.effort),
-                format!("{:?}", domain.flow),
-            ];
-            words.extend(domain.nodes.iter().map(|node| format!("v({node})")));
-            words.extend(domain.devices.iter().map(|device| format!("i({device})")));
-            push("domain", words.join(" "));
+            let begin =
+                format!("{} {} {}", domain.domain, number(domain.effort), number(domain.flow));
+            let nodes = domain.nodes.iter().map(|node| format!("v({node})"));
+            let devices = domain.devices.iter().map(|device| format!("i({device})"));
+            let mut line = begin.clone();
+            for word in nodes.chain(devices) {
+                if line.len() + 1 + word.len() > DOMAIN_WIDTH && line.len() > begin.len() {
+                    push("domain", std::mem::replace(&mut line, begin.clone()));
+                }
+                line.push(' ');
+                line.push_str(&word);
+            }
+            push("domain", line);
         }
         for column in &self.columns {
             push("column", serde_json::json!([column.name, column.unit, column.expr]).to_string());
@@ -156,7 +166,16 @@ impl Header {
                         _ => return None,
                     }
                 }
-                self.domains.push(domain);
+                match self.domains.iter_mut().find(|known| {
+                    (&known.domain, known.effort, known.flow)
+                        == (&domain.domain, domain.effort, domain.flow)
+                }) {
+                    Some(known) => {
+                        known.nodes.extend(domain.nodes);
+                        known.devices.extend(domain.devices);
+                    }
+                    None => self.domains.push(domain),
+                }
             }
             "column" => {
                 let (name, unit, expr) = serde_json::from_str(value).ok()?;
@@ -186,7 +205,7 @@ mod tests {
                 domain: "hydraulic".into(),
                 effort: 1e6,
                 flow: 1e-5,
-                nodes: vec!["a".into()],
+                nodes: (0..20).map(|n| format!("chamber_{n}")).collect(),
                 devices: vec!["V_b".into(), "E_c".into()],
             }],
             columns: vec![Column {

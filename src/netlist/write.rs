@@ -11,6 +11,8 @@ use crate::expr::print::{number, print};
 const WIDTH: usize = 80;
 /// Comments begin here where they can.
 const COMMENT: usize = 44;
+/// The same behind a parameter.
+const PARAMETER_COMMENT: usize = 26;
 
 /// The text of a netlist.
 pub fn write(netlist: &Netlist) -> String {
@@ -242,7 +244,12 @@ fn line(text: &mut String, words: &[String], comment: Option<&str>) {
     match (comment, lines.as_mut_slice()) {
         (None, _) => {}
         (Some(comment), [only]) if only.len() + 3 + comment.chars().count() < WIDTH => {
-            let column = COMMENT.min(WIDTH - 3 - comment.chars().count());
+            let column = if words.first().is_some_and(|word| word == ".param") {
+                PARAMETER_COMMENT
+            } else {
+                COMMENT
+            };
+            let column = if column + 3 + comment.chars().count() < WIDTH { column } else { 0 };
             *only = format!("{only:<column$} ; {comment}");
         }
         (Some(comment), _) => text.push_str(&format!("* {comment}\n")),

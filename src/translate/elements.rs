@@ -2,14 +2,17 @@
 
 use super::Builder;
 use super::flows::{Carrier, own_device};
-use super::forms::{Form, Integrator, SourceValue, expressions};
+use super::forms::{Form, Integrator, SourceValue, constant_value, expressions};
 use super::map::Link;
 use super::names::Namer;
 use super::series_parallel::Item;
-use super::values::{Speaker, Unreadable, negate, product};
-use crate::bond::graph::{BondGraph, BondId, End, Leaf, SignalLaw, Variable, VertexId};
+use super::values::{Speaker, Unreadable, negate, product, signed, tidy};
+use crate::bond::graph::{
+    self, BondGraph, BondId, End, Initial, Law, Leaf, SignalLaw, StoreInitial, StoreLaw, Variable,
+    VertexId,
+};
 use crate::diagnostic::Diagnostic;
-use crate::expr::Node;
+use crate::expr::{Binary, Node};
 use crate::netlist::{self, Element, Expr, Name, Waveform};
 
 /// By vertex in rate form whose q or p is spoken of: an integrator that counts it.
@@ -104,7 +107,12 @@ impl Builder<'_> {
         let sense = self.flows.senses.iter().find(|sense| sense.bond == bond).map(|s| s.device);
         if let Some(device) = sense {
             let nodes = points.map(|point| self.node(point));
-            let what = format!("0 V, carries f({})", self.graph.bond_name(bond));
+            let ends = [self.graph.bond(bond).from.vertex, self.graph.bond(bond).to.vertex];
+            let series = ends.into_iter().find(|id| matches!(self.graph.vertex(*id).law, Law::One));
+            let what = match series {
+                Some(junction) => format!("0 V, carries f({})", self.graph.vertex(junction).name),
+                None => format!("0 V, carries f({})", self.graph.bond_name(bond)),
+            };
             let span = self.graph.bond(bond).span;
             let value = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)));
             self.device(device, nodes, value, span, &what);
@@ -196,19 +204,20 @@ impl Builder<'_> {
             }
             Form::Capacitor { device, value } => {
                 let value = self.constant(value);
-                let initial = Some(Expr::number(self.initial_power(id)));
+                let initial = Some(self.initial_power(id));
                 self.device(*device, nodes, Element::Capacitor { value, initial }, span, &what);
             }
             Form::Inductor { device, value } => {
                 let value = self.constant(value);
-                let initial = Some(Expr::number(self.initial_power(id)));
+                let initial = Some(self.initial_power(id));
                 self.device(*device, nodes, Element::Inductor { value, initial }, span, &what);
             }
             Form::StoredEffort { device, state, law: expr } => {
                 let law = law(self, expr)?;
                 self.device(*device, nodes, Element::BehaviouralVoltage { law }, span, &what);
                 let feed = self.current(Carrier { device: *device, negated: false });
-                self.integrator(*state, feed, self.initial_stored(id), span, &what);
+                let initial = self.initial_stored(id);
+                self.integrator(*state, feed, initial, span, &what);
             }
             Form::StoredFlow { device, state, law: expr } => {
                 let law = law(self, expr)?;
@@ -256,24 +265,23 @@ impl Builder<'_> {
                 let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
                 let modulus = law(self, modulus)?;
                 let what = format!("{what}.{}", port + 1);
-                let (device, element) = if port == *lead {
+                let (device, nodes, element) = if port == *lead {
                     let element = if *modulated {
-                        let law = product(modulus, self.voltage(other));
+                        let law = tidy(product(modulus, self.voltage(other)));
                         Element::BehaviouralVoltage { law }
                     } else {
                         Element::Vcvs { gain: modulus, control: other }
                     };
-                    (*effort, element)
+                    (*effort, nodes, element)
                 } else {
-                    // What flows into the leading port flows out of this one, m times.
+                    // What flows into the leading port's + flows out of this one's, m times.
                     let current = self.current(Carrier { device: *effort, negated: false });
                     let element = if *modulated {
-                        let law = negate(product(modulus, current));
-                        Element::BehaviouralCurrent { law }
+                        Element::BehaviouralCurrent { law: tidy(product(modulus, current)) }
                     } else {
-                        Element::Cccs { gain: negate(modulus), control: *effort }
+                        Element::Cccs { gain: modulus, control: *effort }
                     };
-                    (*flow, element)
+                    (*flow, [nodes[1], nodes[0]], element)
                 };
                 self.device(device, nodes, element, span, &what);
             }
@@ -287,8 +295,8 @@ impl Builder<'_> {
                 let element = if *modulated {
                     let flow = self.inflow(id, 1 - end.port, far, speaker);
                     let flow = flow.unwrap_or_else(|| Expr::number(f64::NAN));
-                    let law = product(modulus, flow);
-                    Element::BehaviouralVoltage { law: if port == 0 { negate(law) } else { law } }
+                    let law = tidy(signed(product(modulus, flow), port == 0));
+                    Element::BehaviouralVoltage { law }
                 } else {
                     let Some(carrier) = self.flows.carrier(far, None) else { return Ok(()) };
                     let negative = carrier.negated ^ outward ^ (port == 0);
@@ -301,10 +309,10 @@ impl Builder<'_> {
                 // f1 = g·e2 into port 1, f2 = g·e1 out of port 2.
                 let Some(other) = self.port(id, 1 - port) else { return Ok(()) };
                 let modulus = law(self, modulus)?;
-                let modulus = if port == 1 { negate(modulus) } else { modulus };
+                let nodes = if port == 1 { [nodes[1], nodes[0]] } else { nodes };
                 let what = format!("{what}.{}", port + 1);
                 let element = if *modulated {
-                    let law = product(modulus, self.voltage(other));
+                    let law = tidy(product(modulus, self.voltage(other)));
                     Element::BehaviouralCurrent { law }
                 } else {
                     Element::Vccs { gain: modulus, control: other }
@@ -323,7 +331,7 @@ impl Builder<'_> {
         &mut self,
         state: Integrator,
         rate: Expr,
-        initial: f64,
+        initial: Expr,
         span: crate::source::Span,
         what: &str,
     ) {
@@ -339,7 +347,7 @@ impl Builder<'_> {
         &mut self,
         state: Integrator,
         law: Expr,
-        initial: f64,
+        initial: Expr,
         span: crate::source::Span,
         what: &str,
     ) {
@@ -348,9 +356,9 @@ impl Builder<'_> {
         self.farad(state, initial, span, what);
     }
 
-    fn farad(&mut self, state: Integrator, initial: f64, span: crate::source::Span, what: &str) {
+    fn farad(&mut self, state: Integrator, initial: Expr, span: crate::source::Span, what: &str) {
         let nodes = [state.node, self.ground()];
-        let initial = Some(Expr::number(initial));
+        let initial = Some(initial);
         let value = Expr::number(1.0);
         self.device(state.capacitor, nodes, Element::Capacitor { value, initial }, span, what);
     }
@@ -366,13 +374,43 @@ impl Builder<'_> {
         if effort { Element::Vcvs { gain, control } } else { Element::Vccs { gain, control } }
     }
 
-    /// The power variable that a storage starts with.
-    fn initial_power(&self, id: VertexId) -> f64 {
-        self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.power)
+    /// The power variable that a storage starts with, as it was stated where that is what it starts with.
+    fn initial_power(&self, id: VertexId) -> Expr {
+        let value =
+            self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.power);
+        let stated = match &self.graph.vertex(id).law {
+            Law::Store { initial: StoreInitial::Power(stated), .. }
+            | Law::Rate { initial: Initial::Given(stated), .. } => Some(stated.clone()),
+            Law::Store {
+                initial: StoreInitial::Stored(stated),
+                law: StoreLaw::Linear(size),
+                ..
+            } => Some(stated.clone().binary(Binary::Divide, size.clone())),
+            _ => None,
+        };
+        self.stated(stated.as_ref(), value)
     }
 
-    fn initial_stored(&self, id: VertexId) -> f64 {
-        self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.stored)
+    /// q or p that a storage starts with.
+    fn initial_stored(&self, id: VertexId) -> Expr {
+        let value =
+            self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.stored);
+        let stated = match &self.graph.vertex(id).law {
+            Law::Store { initial: StoreInitial::Stored(stated), .. } => Some(stated),
+            _ => None,
+        };
+        self.stated(stated, value)
+    }
+
+    /// The expression when it holds parameters and has this value, else the value.
+    pub(super) fn stated(&self, expr: Option<&graph::Expr>, value: f64) -> Expr {
+        let symbolic = expr.filter(|expr| {
+            let mut parameters = 0;
+            expr.leaves(&mut |_, _| parameters += 1);
+            let stated = constant_value(self.graph, expr).unwrap_or(f64::NAN);
+            parameters > 0 && (stated - value).abs() <= 1e-12 * value.abs()
+        });
+        symbolic.map_or_else(|| Expr::number(value), |expr| self.constant(expr))
     }
 }
 

@@ -4,8 +4,9 @@ use super::Builder;
 use super::names::Renamed;
 use super::values::Speaker;
 use crate::bond::graph::{BondId, Law, Power, SignalOrigin, Storage};
+use crate::expr::Node;
 use crate::netlist::write::expression;
-use crate::netlist::{CardKind, Expr, Names};
+use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
 use crate::quantity::Domain;
 
 /// The map of a translation.
@@ -17,6 +18,8 @@ pub struct Map {
     pub variables: Vec<Variable>,
     /// Devices and where they come from, in the order of the netlist.
     pub cards: Vec<MapCard>,
+    /// Parameters and their values in SI.
+    pub parameters: Vec<(Name, f64)>,
     /// Names that SPICE would not take, or not tell apart.
     pub renamed: Vec<Renamed>,
     /// How much circuit it took.
@@ -78,13 +81,24 @@ pub struct Link {
 impl Map {
     /// The map as JSON, schema 1.
     pub fn json(&self, names: &Names) -> serde_json::Value {
+        // A result holds no parameters: they stand here as numbers.
+        let value = |expr: &Expr| {
+            expr.map(&mut |leaf, span| match leaf {
+                Leaf::Parameter(name) => match self.parameters.iter().find(|(p, _)| p == name) {
+                    Some((_, value)) => Expr::new(Node::Number(*value), span),
+                    None => Expr::leaf(leaf.clone()),
+                },
+                leaf => Expr::leaf(leaf.clone()),
+            })
+        };
         let variables: Vec<_> = self
             .variables
             .iter()
-            .map(|variable| {
+            .filter_map(|variable| Some((variable, variable.expr.as_ref()?)))
+            .map(|(variable, expr)| {
                 serde_json::json!({
                     "bg": variable.bg,
-                    "expr": variable.expr.as_ref().map(|expr| expression(names, expr)),
+                    "expr": expression(names, &value(expr)),
                     "factor": variable.factor,
                     "unit": variable.unit,
                     "domain": variable.domain.name(),
@@ -143,7 +157,9 @@ impl Builder<'_> {
             helpers: self.flows.senses.len() + self.couplers,
         };
         let renamed = self.namer.renamed.clone();
-        Map { dialect: "ngspice", variables, cards, renamed, figures }
+        let values = self.graph.parameters.iter().map(|parameter| parameter.value);
+        let parameters = self.parameters.iter().copied().zip(values).collect();
+        Map { dialect: "ngspice", variables, cards, parameters, renamed, figures }
     }
 
     fn observed(&self) -> Vec<Variable> {

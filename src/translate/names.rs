@@ -4,15 +4,12 @@
 use crate::netlist::{Name, Names};
 use std::collections::HashSet;
 
-/// Words that ngspice (and what else reads the text) gives a meaning of its own within expressions.
-const RESERVED: &[&str] = &[
-    "0",
-    "gnd",
+/// Words that mean something else than a parameter within expressions (each tried in ngspice, or known of another
+/// simulator that reads the same text).
+const RESERVED_PARAMETERS: &[&str] = &[
     "time",
-    "temp",
     "temper",
     "hertz",
-    "freq",
     "pi",
     "e",
     "i",
@@ -66,20 +63,18 @@ const RESERVED: &[&str] = &[
     "table",
     "tan",
     "tanh",
+    "temp",
     "ternary_fcn",
     "u",
     "u2",
     "unif",
     "uramp",
-    "value",
-    "vol",
-    "cur",
-    "vt",
-    "gmin",
     "var",
-    "true",
-    "false",
 ];
+
+/// Words that mean something else than a node.
+const RESERVED_NODES: &[&str] =
+    &["0", "gnd", "time", "temp", "temper", "hertz", "frequency", "pi", "e", "i", "v", "if"];
 
 /// Letters outside ASCII that have a name of their own.
 const LETTERS: &[(char, &str)] = &[
@@ -191,19 +186,19 @@ pub struct Namer {
 impl Namer {
     /// A fresh name for a parameter.
     pub fn parameter(&mut self, wanted: &str) -> Name {
-        let name = fresh(&mut self.parameters, &ascii(wanted));
+        let name = fresh(&mut self.parameters, RESERVED_PARAMETERS, &ascii(wanted));
         self.give(wanted, name)
     }
 
     /// A fresh name for a node.
     pub fn node(&mut self, wanted: &str) -> Name {
-        let name = fresh(&mut self.nodes, &ascii(wanted));
+        let name = fresh(&mut self.nodes, RESERVED_NODES, &ascii(wanted));
         self.give(wanted, name)
     }
 
     /// A fresh name for a node within a series loop, numbered after the loop's junction.
     pub fn inner_node(&mut self, junction: &str) -> Name {
-        let name = fresh(&mut self.nodes, &ascii(junction));
+        let name = fresh(&mut self.nodes, RESERVED_NODES, &ascii(junction));
         self.names.intern(&name)
     }
 
@@ -214,7 +209,7 @@ impl Namer {
         let begins = begin.next().is_some_and(|first| first.eq_ignore_ascii_case(&letter));
         let full =
             if begins && begin.next() == Some('_') { ascii } else { format!("{letter}_{ascii}") };
-        let name = fresh(&mut self.devices, &full);
+        let name = fresh(&mut self.devices, &[], &full);
         if name != full {
             self.renamed.push(Renamed { from: full, to: name.clone() });
         }
@@ -230,10 +225,10 @@ impl Namer {
 }
 
 /// `wanted`, or with `_2`, `_3` … where it is taken or reserved.
-fn fresh(taken: &mut HashSet<String>, wanted: &str) -> String {
+fn fresh(taken: &mut HashSet<String>, reserved: &[&str], wanted: &str) -> String {
     let mut name = wanted.to_string();
     let mut number = 1;
-    while RESERVED.contains(&name.to_lowercase().as_str()) || !taken.insert(name.to_lowercase()) {
+    while reserved.contains(&name.to_lowercase().as_str()) || !taken.insert(name.to_lowercase()) {
         number += 1;
         name = format!("{wanted}_{number}");
     }

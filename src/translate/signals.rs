@@ -5,7 +5,7 @@ use super::elements::linked;
 use super::forms::{Form, Integrator, SourceValue, constant_value, is_constant};
 use super::values::{Speaker, Unreadable};
 use crate::bond::graph::{
-    BondGraph, Expr as GraphExpr, SignalId, SignalLaw, SignalOrigin, VertexId, Waveform,
+    BondGraph, Expr as GraphExpr, Initial, SignalId, SignalLaw, SignalOrigin, VertexId, Waveform,
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
@@ -86,7 +86,7 @@ impl Builder<'_> {
                 let device = self.namer.device('E', &signal.name);
                 self.device(device, nodes, element, signal.span, &what);
             }
-            SignalLaw::Integrator { rate, .. } => {
+            SignalLaw::Integrator { rate, initial } => {
                 let rate = self.value(rate, None, card)?;
                 let letter = match linked(&rate, self.ground(), true) {
                     Some(Element::Cccs { .. }) => 'F',
@@ -97,7 +97,12 @@ impl Builder<'_> {
                     capacitor: self.namer.device('C', &signal.name),
                     feed: self.namer.device(letter, &signal.name),
                 };
-                let initial = self.initial.signals.get(id.index()).copied().unwrap_or(0.0);
+                let stated = match initial {
+                    Initial::Given(stated) => Some(stated),
+                    Initial::Implied => None,
+                };
+                let value = self.initial.signals.get(id.index()).copied().unwrap_or(0.0);
+                let initial = self.stated(stated, value);
                 self.integrator(state, rate, initial, signal.span, &what);
             }
             SignalLaw::Waveform(_) => {
@@ -127,7 +132,7 @@ impl Builder<'_> {
                 }
                 jumps.times.push(value(at));
                 let start = self.constant(at);
-                let end = start.clone().binary(Binary::Add, Expr::number(rise));
+                let end = later(start.clone(), rise);
                 let [low, high] = [before, after].map(|expr| self.constant(expr));
                 let arguments = vec![Expr::number(0.0), low.clone(), start, low, end, high];
                 (Shape::Pwl, arguments)
@@ -180,7 +185,7 @@ impl Builder<'_> {
                     let time = match before {
                         Some((earlier, _)) if value(earlier) == value(time) => {
                             jumps.times.push(value(time));
-                            start.binary(Binary::Add, Expr::number(rise))
+                            later(start, rise)
                         }
                         _ => start,
                     };
@@ -194,5 +199,13 @@ impl Builder<'_> {
         }
         let (shape, arguments) = function;
         netlist::Waveform::Function { shape, arguments }
+    }
+}
+
+/// A time a little later.
+fn later(time: Expr, by: f64) -> Expr {
+    match time.as_number() {
+        Some(value) => Expr::number(value + by),
+        None => time.binary(Binary::Add, Expr::number(by)),
     }
 }

@@ -65,6 +65,46 @@ fn unsigned(expr: Expr) -> (Expr, bool) {
     }
 }
 
+/// Signs drawn together, so that −(−a), a − (−b) and (−a)·b, which come of the directions in which currents are read,
+/// do not stand in the text. Values stay the same to the last bit.
+pub fn tidy(expr: Expr) -> Expr {
+    let (expr, negative) = tidied(expr);
+    signed(expr, negative)
+}
+
+/// An expression and whether its negative is meant.
+fn tidied(expr: Expr) -> (Expr, bool) {
+    let span = expr.span;
+    let at = |node| Expr::new(node, span);
+    match *expr.node {
+        Node::Unary(Unary::Negate, a) => {
+            let (a, negative) = tidied(a);
+            (a, !negative)
+        }
+        Node::Binary(op @ (Binary::Multiply | Binary::Divide), a, b) => {
+            let ((a, a_negative), (b, b_negative)) = (tidied(a), tidied(b));
+            (at(Node::Binary(op, a, b)), a_negative ^ b_negative)
+        }
+        Node::Binary(op @ (Binary::Add | Binary::Subtract), a, b) => {
+            let ((a, a_negative), (b, b_negative)) = (tidied(a), tidied(b));
+            match (a_negative, b_negative ^ (op == Binary::Subtract)) {
+                (false, false) => (at(Node::Binary(Binary::Add, a, b)), false),
+                (false, true) => (at(Node::Binary(Binary::Subtract, a, b)), false),
+                (true, false) => (at(Node::Binary(Binary::Subtract, b, a)), false),
+                (true, true) => (at(Node::Binary(Binary::Add, a, b)), true),
+            }
+        }
+        Node::Unary(op, a) => (at(Node::Unary(op, tidy(a))), false),
+        Node::Binary(op, a, b) => (at(Node::Binary(op, tidy(a), tidy(b))), false),
+        Node::Call(function, arguments) => {
+            (at(Node::Call(function, arguments.into_iter().map(tidy).collect())), false)
+        }
+        Node::If(c, a, b) => (at(Node::If(tidy(c), tidy(a), tidy(b))), false),
+        Node::Table(a, table) => (at(Node::Table(tidy(a), table)), false),
+        node @ (Node::Number(_) | Node::Leaf(_)) => (at(node), false),
+    }
+}
+
 impl Builder<'_> {
     /// v(+) − v(−), with ground left out.
     pub fn voltage(&self, [plus, minus]: [Name; 2]) -> Expr {
@@ -100,7 +140,7 @@ impl Builder<'_> {
         own: Option<VertexId>,
         speaker: Speaker,
     ) -> Result<Expr, Unreadable> {
-        expr.try_map(&mut |leaf, span| self.leaf(leaf, span, own, speaker))
+        expr.try_map(&mut |leaf, span| self.leaf(leaf, span, own, speaker)).map(tidy)
     }
 
     /// An expression of parameters.
