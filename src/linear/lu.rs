@@ -8,13 +8,14 @@
 //! place is an index that was worked out once, nothing is searched for and nothing allocated. A replay with pivots that
 //! have become bad for the new values ends with [`Trouble`].
 
+use super::choose::{choose_pivots, equilibrate};
 use super::pivots::{Cause, Elimination, Singular};
-use super::{Field, Pattern, degree, gilbert, markowitz, matching};
+use super::{Field, Pattern};
 
 /// Up to this many unknowns pivots are chosen by Markowitz's rule.
 pub const SMALL: usize = 2000;
-/// Above this many multiplications the replay goes through a dense column instead of a list of targets.
-const LISTED: usize = 4_000_000;
+/// Up to this many multiplications the replay is a flat list of them, above it goes column by column through a dense one.
+const LISTED: usize = 100_000;
 /// A pivot may shrink by this much relative to the entries below it, or to its whole column, before a replay is refused.
 const GUARD_BELOW: f64 = 1e-3;
 const GUARD_COLUMN: f64 = 1e-5;
@@ -54,11 +55,15 @@ pub struct Lu<T> {
     /// Where each slot of the pattern goes, and what it is multiplied by.
     place: Vec<u32>,
     scale: Vec<f64>,
-    /// For each entry above the diagonal in turn, where the entries of that pivot's column of L go in this column.
-    targets: Option<Vec<u32>>,
-    /// One column, when there are no targets.
+    /// The flat program: after each pivot, factors[a] −= factors[b]·factors[c] for each [a, b, c].
+    program: Vec<[u32; 3]>,
+    /// What each pivot's part of the program is; empty where there is none.
+    program_starts: Vec<u32>,
+    /// One column, when there is no program.
     dense: Vec<T>,
     operations: usize,
+    /// Magnitudes of the diagonal as loaded, as bits.
+    loaded: Vec<u64>,
     /// The least allowed ratio of each pivot to the largest entry below it, and to the largest of its column.
     floors: Vec<(f64, f64)>,
     growth: f64,
@@ -180,6 +185,14 @@ impl<T: Field> Lu<T> {
         error
     }
 
+    /// The same factors, replayed column by column as large ones are.
+    #[cfg(test)]
+    pub(super) fn without_program(mut self) -> Lu<T> {
+        self.program_starts.clear();
+        self.dense = vec![T::ZERO; self.n];
+        self
+    }
+
     #[cfg(test)]
     pub(super) fn is_finite(&self) -> bool {
         self.factors.iter().chain(&self.inverse).all(|value| value.is_finite())
@@ -243,19 +256,29 @@ impl<T: Field> Lu<T> {
         let above = |k: usize| starts[k] as usize..diagonal[k] as usize;
         let operations: usize =
             (0..n).flat_map(|k| &index[above(k)]).map(|&k| below(k).len()).sum();
-        let targets = (operations <= LISTED).then(|| {
-            let mut targets = Vec::with_capacity(operations);
+        let mut program = Vec::new();
+        let mut program_starts = Vec::new();
+        if operations <= LISTED {
+            // Column by column in the order in which pivots come, then sorted by pivot: within one pivot's part no
+            // two targets are the same, so that nothing waits for the number stored just before.
+            let mut parts: Vec<Vec<[u32; 3]>> = vec![Vec::new(); n];
             for k in 0..n {
-                let start = starts[k] as usize;
-                for (at, &i) in index[start..starts[k + 1] as usize].iter().enumerate() {
-                    where_is[i as usize] = at as u32;
+                let column = starts[k] as usize..starts[k + 1] as usize;
+                for (at, &i) in index[column.clone()].iter().enumerate() {
+                    where_is[i as usize] = starts[k] + at as u32;
                 }
-                for &source in &index[above(k)] {
-                    targets.extend(index[below(source)].iter().map(|&i| where_is[i as usize]));
+                for (at, &source) in column.zip(&index[above(k)]) {
+                    parts[source as usize].extend(
+                        below(source).map(|l| [where_is[index[l] as usize], l as u32, at as u32]),
+                    );
                 }
             }
-            targets
-        });
+            program_starts.push(0);
+            for part in parts {
+                program.extend(part);
+                program_starts.push(program.len() as u32);
+            }
+        }
         Lu {
             n,
             rows: elimination.rows.clone(),
@@ -263,14 +286,16 @@ impl<T: Field> Lu<T> {
             row_scale,
             column_scale,
             factors: vec![T::ZERO; entries],
-            dense: vec![T::ZERO; if targets.is_some() { 0 } else { n }],
+            dense: vec![T::ZERO; if program_starts.is_empty() { n } else { 0 }],
+            loaded: vec![0; n],
             index,
             starts,
             diagonal,
             inverse: vec![T::ZERO; n],
             place,
             scale,
-            targets,
+            program,
+            program_starts,
             operations,
             floors: vec![(0.0, 0.0); n],
             growth: 1.0,
@@ -280,98 +305,95 @@ impl<T: Field> Lu<T> {
     /// The elimination with these values. Unguarded, it sets the guards for later ones.
     fn replay(&mut self, values: &[T], guarded: bool) -> Result<(), Trouble> {
         self.factors.fill(T::ZERO);
+        let mut before = 0;
         for ((&at, &by), &value) in self.place.iter().zip(&self.scale).zip(values) {
-            self.factors[at as usize] = value.scaled(by);
+            let value = value.scaled(by);
+            before = before.max(bits(value));
+            self.factors[at as usize] = value;
         }
-        let before = if T::EXACT { 1.0 } else { largest(&self.factors) };
-        let mut listed = 0;
+        for (loaded, &at) in self.loaded.iter_mut().zip(&self.diagonal) {
+            *loaded = bits(self.factors[at as usize]);
+        }
+        let mut after = before;
         for k in 0..self.n {
-            let (start, diagonal) = (self.starts[k] as usize, self.diagonal[k] as usize);
-            let (done, column) = self.factors.split_at_mut(start);
-            let column = &mut column[..self.starts[k + 1] as usize - start];
-            let column_before = if T::EXACT { 1.0 } else { largest(column) };
-            if let Some(targets) = &self.targets {
-                for at in 0..diagonal - start {
-                    let u = column[at];
-                    let source = self.index[start + at] as usize;
-                    let below =
-                        self.diagonal[source] as usize + 1..self.starts[source + 1] as usize;
-                    let goals = &targets[listed..listed + below.len()];
-                    listed += below.len();
-                    for (&goal, &l) in goals.iter().zip(&done[below]) {
-                        column[goal as usize] = column[goal as usize] - l * u;
-                    }
-                }
-            } else {
-                let index = &self.index[start..start + column.len()];
-                for (&i, &value) in index.iter().zip(column.iter()) {
-                    self.dense[i as usize] = value;
-                }
-                for &source in &index[..diagonal - start] {
-                    let source = source as usize;
-                    let u = self.dense[source];
-                    let below =
-                        self.diagonal[source] as usize + 1..self.starts[source + 1] as usize;
-                    for (&i, &l) in self.index[below.clone()].iter().zip(&done[below]) {
-                        self.dense[i as usize] = self.dense[i as usize] - l * u;
-                    }
-                }
-                for (&i, value) in index.iter().zip(column.iter_mut()) {
-                    *value = self.dense[i as usize];
-                }
+            if self.program_starts.is_empty() {
+                self.make_column(k);
             }
-            let (above, below) = column.split_at_mut(diagonal - start);
-            let [pivot, below @ ..] = below else { continue };
-            let size = pivot.magnitude();
-            let name = (self.rows[k], self.columns[k]);
-            if !pivot.is_finite() {
-                return Err(Trouble::NotFinite { row: name.0, column: name.1 });
-            }
-            if size == 0.0 {
-                return Err(Trouble::Pivot { row: name.0, column: name.1 });
-            }
-            if !T::EXACT {
-                let under = largest(below);
-                let whole = largest(above).max(column_before).max(under).max(size);
-                if guarded {
-                    let (floor_under, floor_whole) = self.floors[k];
-                    if size < floor_under * under || size < floor_whole * whole {
-                        return Err(Trouble::Pivot { row: name.0, column: name.1 });
-                    }
-                } else {
-                    self.floors[k] = (
-                        GUARD_BELOW * (size / under).min(1.0),
-                        GUARD_COLUMN * (size / whole).min(1.0),
-                    );
+            self.pivot(k, guarded, &mut after)?;
+            if let [start, end, ..] = self.program_starts[k.min(self.program_starts.len())..] {
+                let factors = &mut self.factors[..];
+                for &[a, b, c] in &self.program[start as usize..end as usize] {
+                    factors[a as usize] =
+                        factors[a as usize] - factors[b as usize] * factors[c as usize];
                 }
-            }
-            let inverse = T::ONE / *pivot;
-            self.inverse[k] = inverse;
-            for l in below {
-                *l = *l * inverse;
             }
         }
-        if T::EXACT {
-            return Ok(());
+        if !T::EXACT && after > 0 {
+            let growth = f64::from_bits(after) / f64::from_bits(before);
+            if !guarded {
+                self.growth = growth;
+            } else if growth > GUARD_GROWTH * self.growth {
+                return Err(Trouble::Growth);
+            }
         }
-        let growth = largest(&self.factors) / before;
-        if !growth.is_finite() || self.inverse.iter().any(|inverse| !inverse.is_finite()) {
-            let k = (0..self.n)
-                .find(|&k| {
-                    let column = self.starts[k] as usize..self.starts[k + 1] as usize;
-                    !self.inverse[k].is_finite()
-                        || self.factors[column].iter().any(|value| !value.is_finite())
-                })
-                .unwrap_or(0);
-            return match (self.rows.get(k), self.columns.get(k)) {
-                (Some(&row), Some(&column)) => Err(Trouble::NotFinite { row, column }),
-                _ => Ok(()),
-            };
+        Ok(())
+    }
+
+    /// Subtracts from a column all that the pivots before it take out of it.
+    fn make_column(&mut self, k: usize) {
+        let (start, diagonal) = (self.starts[k] as usize, self.diagonal[k] as usize);
+        let (done, column) = self.factors.split_at_mut(start);
+        let column = &mut column[..self.starts[k + 1] as usize - start];
+        let index = &self.index[start..start + column.len()];
+        for (&i, &value) in index.iter().zip(column.iter()) {
+            self.dense[i as usize] = value;
         }
-        if !guarded {
-            self.growth = growth.max(1.0);
-        } else if growth > GUARD_GROWTH * self.growth {
-            return Err(Trouble::Growth);
+        for &source in &index[..diagonal - start] {
+            let source = source as usize;
+            let u = self.dense[source];
+            let below = self.diagonal[source] as usize + 1..self.starts[source + 1] as usize;
+            for (&i, &l) in self.index[below.clone()].iter().zip(&done[below]) {
+                self.dense[i as usize] = self.dense[i as usize] - l * u;
+            }
+        }
+        for (&i, value) in index.iter().zip(column.iter_mut()) {
+            *value = self.dense[i as usize];
+        }
+    }
+
+    /// Looks at a finished column and divides what is below its pivot.
+    fn pivot(&mut self, k: usize, guarded: bool, after: &mut u64) -> Result<(), Trouble> {
+        let diagonal = self.diagonal[k] as usize;
+        let column = &mut self.factors[self.starts[k] as usize..self.starts[k + 1] as usize];
+        let (above, below) = column.split_at_mut(diagonal - self.starts[k] as usize);
+        let [pivot, below @ ..] = below else { return Ok(()) };
+        let (row, column) = (self.rows[k], self.columns[k]);
+        if pivot.is_zero() {
+            return Err(Trouble::Pivot { row, column });
+        }
+        let inverse = T::ONE / *pivot;
+        if !T::EXACT {
+            let (size, under) = (bits(*pivot), largest(below));
+            let whole = largest(above).max(under).max(size).max(self.loaded[k]);
+            if whole >= INFINITE {
+                return Err(Trouble::NotFinite { row, column });
+            }
+            *after = (*after).max(whole);
+            let [size, under, whole] = [size, under, whole].map(f64::from_bits);
+            if !(under * inverse.magnitude()).is_finite() || !inverse.is_finite() {
+                return Err(Trouble::Pivot { row, column });
+            }
+            let (floor_under, floor_whole) = &mut self.floors[k];
+            if !guarded {
+                *floor_under = GUARD_BELOW * (size / under).min(1.0);
+                *floor_whole = GUARD_COLUMN * (size / whole).min(1.0);
+            } else if size < *floor_under * under || size < *floor_whole * whole {
+                return Err(Trouble::Pivot { row, column });
+            }
+        }
+        self.inverse[k] = inverse;
+        for l in below {
+            *l = *l * inverse;
         }
         Ok(())
     }
@@ -407,92 +429,20 @@ pub fn backward_error<T: Field>(
     residual.iter().zip(&size).map(ratio).fold(0.0, larger)
 }
 
+/// The bits of +∞; those of NaN are larger.
+const INFINITE: u64 = 0x7ff0_0000_0000_0000;
+
+/// A magnitude as bits, which are ordered as the numbers are, with infinity and NaN above all.
+fn bits<T: Field>(value: T) -> u64 {
+    value.magnitude().to_bits() & (u64::MAX >> 1)
+}
+
+/// The largest magnitude, as bits.
+fn largest<T: Field>(values: &[T]) -> u64 {
+    values.iter().fold(0, |largest, &value| largest.max(bits(value)))
+}
+
 /// The larger; NaN where there is one.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
-}
-
-/// The largest magnitude; NaN where there is one.
-fn largest<T: Field>(values: &[T]) -> f64 {
-    values.iter().fold(0.0, |largest, value| larger(largest, value.magnitude()))
-}
-
-fn choose_pivots<T: Field>(
-    pattern: &Pattern,
-    scaled: &[T],
-    small: bool,
-) -> Result<Elimination<T>, Singular> {
-    let structural = |matching: &matching::Matching| Singular {
-        cause: Cause::Structural,
-        rows: matching.overdetermined(pattern),
-        columns: matching.underdetermined(pattern),
-    };
-    if small {
-        return markowitz::eliminate(pattern, scaled).map_err(|numeric| {
-            let matching = matching::maximum_matching(pattern, |_| true);
-            if matching.is_perfect() { numeric } else { structural(&matching) }
-        });
-    }
-    // Diagonals that are not small, as nodes have, make good pivots; branches without one take a row of their nodes.
-    let matching = matching::maximum_matching(pattern, |slot| scaled[slot].magnitude() > 0.01);
-    if !matching.is_perfect() {
-        return Err(structural(&matching));
-    }
-    let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); pattern.n];
-    for j in 0..pattern.n {
-        for slot in pattern.column(j) {
-            let i = matching.column_of[pattern.rows[slot] as usize];
-            if i as usize != j {
-                neighbours[i as usize].push(j as u32);
-                neighbours[j].push(i);
-            }
-        }
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    let order = degree::minimum_degree(neighbours);
-    gilbert::eliminate(pattern, scaled, &order, &matching.row_of)
-}
-
-/// Powers of two for rows and columns that bring the largest entry of each near to 1 (Ruiz, 2001).
-fn equilibrate<T: Field>(pattern: &Pattern, values: &[T]) -> (Vec<f64>, Vec<f64>) {
-    let n = pattern.n;
-    let (mut rows, mut columns) = (vec![0i32; n], vec![0i32; n]);
-    if !T::EXACT {
-        for _ in 0..4 {
-            let (mut row_largest, mut column_largest) = (vec![i32::MIN; n], vec![i32::MIN; n]);
-            for j in 0..n {
-                for slot in pattern.column(j) {
-                    let size = values[slot].magnitude();
-                    if size > 0.0 {
-                        let i = pattern.rows[slot] as usize;
-                        let exponent = exponent(size) + rows[i] + columns[j];
-                        row_largest[i] = row_largest[i].max(exponent);
-                        column_largest[j] = column_largest[j].max(exponent);
-                    }
-                }
-            }
-            let adjust = |scales: &mut [i32], largest: &[i32]| {
-                for (scale, &largest) in scales.iter_mut().zip(largest) {
-                    if largest != i32::MIN {
-                        *scale = (*scale - largest.div_euclid(2)).clamp(-500, 500);
-                    }
-                }
-            };
-            adjust(&mut rows, &row_largest);
-            adjust(&mut columns, &column_largest);
-        }
-    }
-    let power = |scales: Vec<i32>| {
-        scales.into_iter().map(|k| f64::from_bits(((1023 + k) as u64) << 52)).collect()
-    };
-    (power(rows), power(columns))
-}
-
-/// The whole part of log₂ of a positive number.
-fn exponent(size: f64) -> i32 {
-    let bits = (size.to_bits() >> 52) as i32 & 0x7ff;
-    if bits == 0 { exponent(size * 18_014_398_509_481_984.0) - 54 } else { bits - 1023 }
 }

@@ -6,6 +6,7 @@
 //! Pivots are chosen by Markowitz's rule with a threshold up to [`lu::SMALL`] unknowns, beyond that column by column
 //! in an order of minimum degree (T. A. Davis, *Direct Methods for Sparse Linear Systems*, 2006).
 
+mod choose;
 mod degree;
 mod field;
 mod gilbert;

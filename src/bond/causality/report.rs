@@ -137,6 +137,14 @@ fn tell_conflict(graph: &BondGraph, conflict: &Conflict) -> Diagnostic {
             format!("{who} {both} impose the flow of {place}"),
             "take one away, or put an R in parallel with it on a 0-junction",
         ),
+        Law::Transformer(_) if several && sets(Power::Effort) => (
+            format!("{who} impose the efforts of both ports of {place}, and nothing its flow"),
+            "a transformer passes the effort one way and the flow the other: put an R or I on a 1-junction next to it",
+        ),
+        Law::Transformer(_) if several && sets(Power::Flow) => (
+            format!("{who} impose the flows of both ports of {place}, and nothing its effort"),
+            "a transformer passes the effort one way and the flow the other: put an R or C on a 0-junction next to it",
+        ),
         Law::Transformer(_) | Law::Gyrator(_) if several => (
             format!("{who} impose what excludes each other on the two ports of {place}"),
             "a transformer passes effort one way and flow the other, a gyrator turns one into the other",
@@ -212,7 +220,7 @@ fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependen
     let (states, storages) =
         (causality.states.len(), causality.states.len() + causality.dependent.len());
     diagnostic
-        .because(format!("{storages} storages, {states} of them states"))
+        .because(format!("of {storages} storages {states} are states"))
         .help("the result is right as it stands; a stiff C or a small R between them would make it a state of its own")
 }
 
