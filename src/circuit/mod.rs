@@ -60,7 +60,7 @@ pub struct Device {
 }
 
 /// The devices; each has a file of its own in `devices/` with equation, sign, units and source.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum DeviceKind {
     Resistor {

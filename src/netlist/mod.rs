@@ -4,6 +4,7 @@ pub mod names;
 pub mod header;
 pub mod read;
 pub mod write;
+pub mod flatten;
 
 use crate::expr;
 use crate::source::Span;

@@ -1,0 +1,147 @@
+//! What is to be computed: analyses, options, outputs, initial values, usual magnitudes.
+
+use super::expand::Flat;
+use super::kinds;
+use super::scope::{self, TOP};
+use super::values::Lookup;
+use crate::circuit::{Analysis, Circuit, NodeId, Output};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::header::Header;
+use crate::netlist::read::expression::expression;
+use crate::netlist::{CardKind, Expr};
+use crate::source::{FileId, Span};
+use std::collections::{HashMap, HashSet};
+
+/// Analyses, and options with those of the header last.
+pub fn settings(
+    flat: &Flat,
+    header: &Header,
+    d: &mut Vec<Diagnostic>,
+) -> (Vec<Analysis>, Vec<(String, String)>) {
+    let (mut analyses, mut options) = (vec![], vec![]);
+    for card in &flat.netlist.cards {
+        match &card.kind {
+            CardKind::Options(given) => options.extend(given.iter().cloned()),
+            CardKind::OperatingPoint => analyses.push(Analysis::OperatingPoint),
+            CardKind::Transient { step, stop, start, hmax, uic } => {
+                let mut number =
+                    |expr: &Expr| scope::number(&flat.scopes, TOP, expr, &flat.netlist.names, d);
+                let (step, stop) = (number(step), number(stop));
+                let start = start.as_ref().map_or(Some(0.0), &mut number);
+                let hmax = hmax.as_ref().map_or(Some(None), |hmax| number(hmax).map(Some));
+                if let (Some(step), Some(stop), Some(start), Some(hmax)) = (step, stop, start, hmax)
+                {
+                    let hmax = hmax.filter(|limit| *limit > 0.0 && !header.hmax_auto);
+                    let sound =
+                        step > 0.0 && stop > start && start >= 0.0 && (step + stop).is_finite();
+                    if !sound {
+                        let error = Diagnostic::error("E0745", card.span, "these times make no sense")
+                            .help(".tran step stop [start [hmax]] [uic], with step > 0 and 0 <= start < stop");
+                        d.push(error);
+                    }
+                    analyses.push(Analysis::Transient { step, stop, start, hmax, uic: *uic });
+                }
+            }
+            _ => {}
+        }
+    }
+    if header.hmax_auto {
+        options.push(("hmax".into(), "auto".into()));
+    }
+    options.extend(header.options.iter().cloned());
+    (analyses, options)
+}
+
+/// Output columns (those of the header, else those of `.save` and `.print`), and `.ic` values.
+pub fn readings(
+    flat: &Flat,
+    header: &Header,
+    d: &mut Vec<Diagnostic>,
+) -> (Vec<Output>, Vec<(NodeId, f64)>) {
+    let lookup = Lookup::new(flat, &flat.netlist.names);
+    let mut initial = vec![];
+    for (id, name, expr, span) in &flat.initial {
+        let (node, value) = (lookup.node(*id, *name, *span, d), lookup.number(*id, expr, d));
+        if let (Some(node), Some(value)) = (node, value) {
+            initial.push((node, value));
+        }
+    }
+    let mut outputs = vec![];
+    if !header.columns.is_empty() {
+        columns(flat, header, &mut outputs, d);
+        return (outputs, initial);
+    }
+    let mut seen = HashSet::new();
+    for card in &flat.netlist.cards {
+        let CardKind::Save { items, .. } = &card.kind else { continue };
+        if items.is_empty() {
+            // `.save all`
+            return (vec![], initial);
+        }
+        for (text, expr) in items {
+            if seen.insert(text.to_lowercase())
+                && let Some(expr) = lookup.law(TOP, expr, d)
+            {
+                outputs.push(Output { name: text.clone(), expr });
+            }
+        }
+    }
+    (outputs, initial)
+}
+
+/// The columns of the header. Their expressions stand in no text that a message could point at.
+fn columns(flat: &Flat, header: &Header, outputs: &mut Vec<Output>, d: &mut Vec<Diagnostic>) {
+    let mut names = flat.netlist.names.clone();
+    let mut read = vec![];
+    for column in &header.columns {
+        let mut found = vec![];
+        let expr = expression(&column.expr, &mut names, FileId(u32::MAX), 0, &mut found);
+        let expr = expr.map(|expr| expr.map(&mut |leaf, _| Expr::leaf(leaf.clone())));
+        complain(&column.name, found, d);
+        read.push((column, expr));
+    }
+    let lookup = Lookup::new(flat, &names);
+    for (column, expr) in read {
+        let mut found = vec![];
+        if let Some(expr) = expr.and_then(|expr| lookup.law(TOP, &expr, &mut found)) {
+            outputs.push(Output { name: column.name.clone(), expr });
+        }
+        complain(&column.name, found, d);
+    }
+}
+
+fn complain(column: &str, found: Vec<Diagnostic>, d: &mut Vec<Diagnostic>) {
+    for error in found {
+        let message = format!("in the column `{column}` of the header: {}", error.message);
+        d.push(Diagnostic { message, labels: vec![], ..error });
+    }
+}
+
+/// Gives nodes and devices the usual magnitudes of their domains; checks that there is a ground.
+pub fn scales(circuit: &mut Circuit, header: &Header, d: &mut Vec<Diagnostic>) {
+    if !circuit.devices.is_empty() && !kinds::is_grounded(&circuit.devices) {
+        d.push(
+            Diagnostic::error(
+                "E0746",
+                circuit.devices.first().map_or(Span::NONE, |device| device.span),
+                "no node is the ground",
+            )
+            .says("the first of the devices, none of which stands at node 0")
+            .help("call the reference node `0` or `gnd`"),
+        );
+    }
+    if header.domains.is_empty() {
+        return;
+    }
+    let (mut efforts, mut flows) = (HashMap::new(), HashMap::new());
+    for domain in &header.domains {
+        efforts.extend(domain.nodes.iter().map(|node| (node.to_lowercase(), domain.effort)));
+        flows.extend(domain.devices.iter().map(|device| (device.to_lowercase(), domain.flow)));
+    }
+    for node in &mut circuit.nodes {
+        node.nominal = efforts.get(&node.name.to_lowercase()).copied();
+    }
+    for device in &mut circuit.devices {
+        device.nominal = flows.get(&device.name.to_lowercase()).copied();
+    }
+}

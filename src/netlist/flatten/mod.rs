@@ -1,0 +1,48 @@
+//! From cards to the flat circuit: subcircuits expanded, parameters and models become numbers, names become indices.
+//!
+//! Two passes. The first walks the cards and the bodies of instances, makes the nodes that devices stand between, and
+//! numbers the devices; the second, when every name is known, says what each device is.
+
+mod scope;
+mod expand;
+mod values;
+mod kinds;
+mod sources;
+mod experiment;
+mod usage;
+
+use super::{Netlist, header::Header};
+use crate::circuit::Circuit;
+use crate::diagnostic::{Diagnostic, has_errors};
+use crate::source::Span;
+
+/// The circuit of a netlist; `None` when there were errors.
+pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<Circuit> {
+    let before = diagnostics.len();
+    let (header, strange) = Header::read(&netlist.header);
+    for line in strange {
+        let message = format!("`*bondspice {line}` is not understood");
+        diagnostics.push(Diagnostic::warning("W0730", Span::NONE, message));
+    }
+    usage::check(netlist, &header, diagnostics);
+    let flat = expand::expand(netlist, diagnostics);
+    let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
+    let times = sources::Times::of(&analyses);
+    let devices = kinds::resolve(&flat, &header, times, diagnostics);
+    let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
+    let mut circuit = Circuit {
+        title: netlist.title.clone(),
+        nodes: flat.nodes,
+        devices,
+        initial,
+        analyses,
+        outputs,
+        options,
+        grid: header.grid,
+    };
+    experiment::scales(&mut circuit, &header, diagnostics);
+    (!has_errors(&diagnostics[before..])).then_some(circuit)
+}
+
+#[cfg(test)]
+mod tests;

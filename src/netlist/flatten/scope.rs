@@ -1,0 +1,249 @@
+//! Scopes: the top of a netlist, and each instance of a subcircuit.
+
+use crate::circuit::{DeviceId, NodeId};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::{Card, Expr, Leaf, Name, Names, Subcircuit};
+use crate::quantity::nearest;
+use crate::source::Span;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Names are small integers: one multiplication spreads them enough.
+#[derive(Default)]
+pub struct NameHasher(u64);
+
+impl Hasher for NameHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.write_u32(u32::from(*byte));
+        }
+    }
+
+    fn write_u32(&mut self, value: u32) {
+        self.0 = (self.0.rotate_left(5) ^ u64::from(value)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 ^= self.0 >> 29;
+    }
+}
+
+/// A table by names. Never walked, so that no order of a hash shows.
+pub type Table<V> = HashMap<Name, V, BuildHasherDefault<NameHasher>>;
+
+/// Index of a scope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScopeId(pub u32);
+
+/// A scope.
+#[derive(Default)]
+pub struct Scope<'n> {
+    /// `x1.x2.`, or nothing at the top.
+    pub path: String,
+    /// The scope that its definition stands in.
+    pub parent: Option<ScopeId>,
+    /// Parameters as numbers.
+    pub parameters: Table<f64>,
+    /// Nodes.
+    pub nodes: Table<NodeId>,
+    /// Devices; of a K with several pairs the first.
+    pub devices: Table<DeviceId>,
+    /// Models: their type and parameters, with their card.
+    pub models: Table<(&'n Card, &'n str, &'n [(String, Expr)])>,
+    /// Definitions.
+    pub subcircuits: Table<&'n Subcircuit>,
+}
+
+/// All scopes, the top first.
+#[derive(Default)]
+pub struct Scopes<'n> {
+    /// By [`ScopeId`].
+    pub all: Vec<Scope<'n>>,
+}
+
+/// The top of the netlist.
+pub const TOP: ScopeId = ScopeId(0);
+
+impl<'n> Scopes<'n> {
+    /// The scope of an index.
+    pub fn get(&self, id: ScopeId) -> &Scope<'n> {
+        &self.all[id.0 as usize]
+    }
+
+    /// The scope of an index, to write to.
+    pub fn get_mut(&mut self, id: ScopeId) -> &mut Scope<'n> {
+        &mut self.all[id.0 as usize]
+    }
+
+    /// A scope and those around it.
+    pub fn around(&self, id: ScopeId) -> impl Iterator<Item = (ScopeId, &Scope<'n>)> {
+        std::iter::successors(Some(id), |id| self.get(*id).parent).map(|id| (id, self.get(id)))
+    }
+
+    /// The value of a parameter, here or around.
+    pub fn parameter(&self, id: ScopeId, name: Name) -> Option<f64> {
+        self.around(id).find_map(|(_, scope)| scope.parameters.get(&name).copied())
+    }
+}
+
+/// Constants that need no `.param`.
+pub fn constant(name: &str) -> Option<f64> {
+    match name.to_ascii_lowercase().as_str() {
+        "pi" => Some(std::f64::consts::PI),
+        "temper" => Some(27.0),
+        _ => None,
+    }
+}
+
+/// Parameters of one scope: names and expressions, in their order; the last of a name counts. Each may use any other
+/// of them, whatever the order, and those of the scopes around.
+pub fn parameters(
+    scopes: &mut Scopes,
+    id: ScopeId,
+    given: &[(Name, &Expr)],
+    names: &Names,
+    d: &mut Vec<Diagnostic>,
+) {
+    let mut wanted: Table<&Expr> = Table::default();
+    for (name, expr) in given {
+        wanted.insert(*name, expr);
+    }
+    let mut failed: Table<()> = Table::default();
+    for (name, _) in given {
+        // A stack of its own, since chains may be long.
+        let mut chain = vec![*name];
+        while let Some(top) = chain.last().copied() {
+            let known = |name: &Name| {
+                scopes.get(id).parameters.contains_key(name) || failed.contains_key(name)
+            };
+            let Some(expr) = wanted.get(&top).filter(|_| !known(&top)) else {
+                chain.pop();
+                continue;
+            };
+            let mut next = None;
+            expr.leaves(&mut |leaf, span| {
+                if let Leaf::Parameter(used) = leaf
+                    && next.is_none()
+                    && wanted.contains_key(used)
+                    && !known(used)
+                {
+                    next = Some((*used, span));
+                }
+            });
+            match next {
+                Some((used, span)) => match chain.iter().position(|name| *name == used) {
+                    Some(start) => {
+                        let round: Vec<_> = chain[start..]
+                            .iter()
+                            .chain([&used])
+                            .map(|name| names.text(*name))
+                            .collect();
+                        d.push(
+                            Diagnostic::error("E0731", span, "parameters that define each other")
+                                .because(format!("{}: each uses the next", round.join(" → "))),
+                        );
+                        for name in &chain {
+                            failed.insert(*name, ());
+                        }
+                    }
+                    None => chain.push(used),
+                },
+                None => {
+                    let value = if failed_within(expr, &failed) {
+                        None
+                    } else {
+                        number(scopes, id, expr, names, d)
+                    };
+                    match value {
+                        Some(value) => {
+                            scopes.get_mut(id).parameters.insert(top, value);
+                        }
+                        None => {
+                            failed.insert(top, ());
+                        }
+                    }
+                    chain.pop();
+                }
+            }
+        }
+    }
+    // What failed has been reported; its users need no report of their own.
+    for (name, _) in given {
+        scopes.get_mut(id).parameters.entry(*name).or_insert(f64::NAN);
+    }
+}
+
+fn failed_within(expr: &Expr, failed: &Table<()>) -> bool {
+    let mut found = false;
+    expr.leaves(&mut |leaf, _| {
+        if let Leaf::Parameter(name) = leaf {
+            found |= failed.contains_key(name);
+        }
+    });
+    found
+}
+
+/// The value of an expression of parameters.
+pub fn number(
+    scopes: &Scopes,
+    id: ScopeId,
+    expr: &Expr,
+    names: &Names,
+    d: &mut Vec<Diagnostic>,
+) -> Option<f64> {
+    if let Some(value) = expr.as_number() {
+        return Some(value);
+    }
+    let (mut wrong, look) = (None, super::values::near(d));
+    expr.leaves(&mut |leaf, span| {
+        let error = match leaf {
+            Leaf::Parameter(name) => {
+                let known =
+                    scopes.parameter(id, *name).is_some() || constant(names.text(*name)).is_some();
+                (!known).then(|| unknown_parameter(scopes, id, *name, span, names, look))
+            }
+            Leaf::Voltage(..) | Leaf::Current(_) | Leaf::Time => Some(
+                Diagnostic::error("E0732", span, "this value must be a number")
+                    .says("it changes during the run")
+                    .help(
+                        "what follows a voltage, a current or time is a B source: V={…} or I={…}",
+                    ),
+            ),
+        };
+        if wrong.is_none() {
+            wrong = error;
+        }
+    });
+    if let Some(error) = wrong {
+        d.push(error);
+        return None;
+    }
+    Some(expr.evaluate(&mut |leaf| match leaf {
+        Leaf::Parameter(name) => {
+            scopes.parameter(id, *name).or_else(|| constant(names.text(*name))).unwrap_or(f64::NAN)
+        }
+        _ => f64::NAN,
+    }))
+}
+
+/// The error for a parameter that nobody defines.
+pub fn unknown_parameter(
+    scopes: &Scopes,
+    id: ScopeId,
+    name: Name,
+    span: Span,
+    names: &Names,
+    look: usize,
+) -> Diagnostic {
+    let text = names.text(name);
+    let known = (0..names.len().min(look) as u32)
+        .map(Name)
+        .filter(|name| scopes.parameter(id, *name).is_some())
+        .map(|name| names.text(name));
+    let error = Diagnostic::error("E0733", span, format!("unknown parameter `{text}`"));
+    match nearest(text, known) {
+        Some(near) => error.help(format!("did you mean `{near}`?")),
+        None => error.help(format!("define it: .param {text}=…")),
+    }
+}

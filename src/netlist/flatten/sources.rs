@@ -1,0 +1,158 @@
+//! Waveforms of independent sources as numbers, with the defaults of SPICE.
+//!
+//! | function | left out or 0 |
+//! |---|---|
+//! | PULSE | rise, fall: the step of `.tran`; width, period: its end |
+//! | SIN | frequency: 1 over the end of `.tran` |
+//! | EXP | delays and time constants: the step of `.tran`, the second delay one step after the first |
+//! | SFFM | both frequencies: 1 over the end of `.tran` |
+//!
+//! A rise or fall that the header lists as a jump is one, exactly; other arguments stay as they are.
+//!
+//! Source: ngspice 39, src/spicelib/devices/vsrc/vsrcload.c.
+
+use super::expand::Pending;
+use super::values::Lookup;
+use crate::circuit::{self, Analysis};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::header::{Header, Jumps};
+use crate::netlist::read::waveforms;
+use crate::netlist::{Shape, Waveform};
+
+/// Step and end of the transient analysis.
+#[derive(Clone, Copy)]
+pub struct Times {
+    step: f64,
+    stop: f64,
+}
+
+impl Times {
+    /// Those of the last transient analysis; 0 and 1 s where there is none.
+    pub fn of(analyses: &[Analysis]) -> Times {
+        let transient = analyses.iter().rev().find_map(|analysis| match analysis {
+            Analysis::Transient { step, stop, .. } => Some(Times { step: *step, stop: *stop }),
+            Analysis::OperatingPoint => None,
+        });
+        transient.unwrap_or(Times { step: 0.0, stop: 1.0 })
+    }
+}
+
+/// The waveform of a source.
+pub fn waveform(
+    lookup: &Lookup,
+    pending: &Pending,
+    waveform: &Waveform,
+    header: &Header,
+    times: Times,
+    d: &mut Vec<Diagnostic>,
+) -> Option<circuit::Waveform> {
+    let (shape, arguments) = match waveform {
+        Waveform::Constant(value) => {
+            return Some(circuit::Waveform::Constant(lookup.number(pending.scope, value, d)?));
+        }
+        Waveform::Function { shape, arguments } => (*shape, arguments),
+    };
+    let mut values = Vec::with_capacity(arguments.len());
+    for argument in arguments {
+        values.push(lookup.number(pending.scope, argument, d)?);
+    }
+    let span = pending.card.span;
+    if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+        d.push(Diagnostic::error("E0744", span, format!("an argument of the waveform is {value}")));
+        return None;
+    }
+    // The argument, or the default where it is left out or 0.
+    let or = |k: usize, default: f64| {
+        values.get(k).copied().filter(|value| *value != 0.0).unwrap_or(default)
+    };
+    let plain = |k: usize| or(k, 0.0);
+    let name = lookup.flat.device_name(pending);
+    let jumps = header.jumps.iter().find(|jumps| jumps.device.eq_ignore_ascii_case(&name));
+    let made = match shape {
+        Shape::Pulse => circuit::Waveform::Pulse {
+            low: plain(0),
+            high: plain(1),
+            delay: plain(2),
+            rise: if jumps.is_some_and(|jumps| jumps.rise) { 0.0 } else { or(3, times.step) },
+            fall: if jumps.is_some_and(|jumps| jumps.fall) { 0.0 } else { or(4, times.step) },
+            width: or(5, times.stop),
+            period: or(6, 0.0),
+        },
+        Shape::Sin => circuit::Waveform::Sine {
+            offset: plain(0),
+            amplitude: plain(1),
+            frequency: or(2, 1.0 / times.stop),
+            delay: plain(3),
+            damping: plain(4),
+            phase: plain(5).to_radians(),
+        },
+        Shape::Pwl => circuit::Waveform::Pwl(points(&values, jumps)),
+        Shape::Exp => {
+            let rise_delay = or(2, times.step);
+            circuit::Waveform::Exponential {
+                from: plain(0),
+                to: plain(1),
+                rise_delay,
+                rise_tau: or(3, times.step),
+                fall_delay: or(4, rise_delay + times.step),
+                fall_tau: or(5, times.step),
+            }
+        }
+        Shape::Sffm => circuit::Waveform::Sffm {
+            offset: plain(0),
+            amplitude: plain(1),
+            carrier: or(2, 1.0 / times.stop),
+            index: plain(3),
+            signal: or(4, 1.0 / times.stop),
+        },
+    };
+    match senseless(&made) {
+        None => Some(made),
+        Some(why) => {
+            let function = waveforms::row(shape).name.to_uppercase();
+            d.push(Diagnostic::error(
+                "E0744",
+                span,
+                format!("the {function} of `{name}` makes no sense: {why}"),
+            ));
+            None
+        }
+    }
+}
+
+/// The points of a PWL; a steep segment that starts at a jump loses its width.
+fn points(values: &[f64], jumps: Option<&Jumps>) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> =
+        values.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
+    for time in jumps.iter().flat_map(|jumps| &jumps.times) {
+        let same = |t: f64| t == *time || (t - time).abs() <= 1e-12 * time.abs();
+        // The last point at that time begins the segment.
+        if let Some(k) = points.iter().rposition(|(t, _)| same(*t))
+            && let Some(next) = points.get_mut(k + 1)
+        {
+            next.0 = *time;
+        }
+    }
+    points
+}
+
+/// Why a waveform makes no sense, if it makes none.
+fn senseless(waveform: &circuit::Waveform) -> Option<&'static str> {
+    match waveform {
+        circuit::Waveform::Pulse { rise, fall, width, period, .. } => [rise, fall, width, period]
+            .iter()
+            .any(|time| **time < 0.0)
+            .then_some("a time is negative"),
+        circuit::Waveform::Pwl(points) => {
+            points.windows(2).any(|pair| pair[1].0 < pair[0].0).then_some("its times run backwards")
+        }
+        circuit::Waveform::Exponential { rise_tau, fall_tau, rise_delay, fall_delay, .. } => {
+            if *rise_tau < 0.0 || *fall_tau < 0.0 {
+                Some("a time constant is negative")
+            } else {
+                (fall_delay < rise_delay).then_some("it falls before it rises")
+            }
+        }
+        _ => None,
+    }
+}

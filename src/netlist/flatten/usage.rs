@@ -1,0 +1,137 @@
+//! Nodes that a netlist names only once: most often a slip of the pen.
+
+use super::values::NEAR;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::header::Header;
+use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist};
+use crate::quantity::nearest;
+use crate::source::Span;
+
+/// Warns of nodes that are named once in a scope, terminals, readings and outputs taken together.
+pub fn check(netlist: &Netlist, header: &Header, d: &mut Vec<Diagnostic>) {
+    let mut usage =
+        Usage { found: 0, scope: 0, last: 0, counts: vec![(0, 0); netlist.names.len()] };
+    // Columns and domains of the header name nodes too; what they name is meant.
+    let mut meant = vec![];
+    for name in header.domains.iter().flat_map(|domain| &domain.nodes) {
+        meant.extend(netlist.names.find(name));
+    }
+    for column in &header.columns {
+        let words =
+            column.expr.split(|c: char| !(c.is_alphanumeric() || matches!(c, '_' | '.' | '#')));
+        meant.extend(words.filter_map(|word| netlist.names.find(word)));
+    }
+    usage.scope(netlist, &netlist.cards, &meant, d);
+    if usage.found > MOST {
+        let message = format!("{} more nodes are named only once", usage.found - MOST);
+        d.push(Diagnostic::warning("W0731", Span::NONE, message));
+    }
+}
+
+/// As many are named; of a big deck nobody reads more.
+const MOST: usize = 20;
+
+struct Usage {
+    found: usize,
+    scope: u32,
+    last: u32,
+    /// For each name the scope that has named it, and how often, 2 meaning more than once.
+    counts: Vec<(u32, u8)>,
+}
+
+impl Usage {
+    fn count(&mut self, name: Name) {
+        if let Some((scope, count)) = self.counts.get_mut(name.0 as usize) {
+            if *scope != self.scope {
+                (*scope, *count) = (self.scope, 0);
+            }
+            *count = (*count + 1).min(2);
+        }
+    }
+
+    fn expr(&mut self, expr: &Expr) {
+        expr.leaves(&mut |leaf, _| {
+            if let Leaf::Voltage(plus, minus) = leaf {
+                self.count(*plus);
+                if let Some(minus) = minus {
+                    self.count(*minus);
+                }
+            }
+        });
+    }
+
+    fn scope(
+        &mut self,
+        netlist: &Netlist,
+        cards: &[Card],
+        meant: &[Name],
+        d: &mut Vec<Diagnostic>,
+    ) {
+        self.last += 1;
+        let own = self.last;
+        self.scope = own;
+        for name in meant.iter().chain(meant) {
+            self.count(*name);
+        }
+        for card in cards {
+            match &card.kind {
+                CardKind::Device(device) => {
+                    device.nodes.iter().for_each(|node| self.count(*node));
+                    match &device.element {
+                        Element::Vcvs { control, .. }
+                        | Element::Vccs { control, .. }
+                        | Element::Switch { control, .. } => {
+                            control.iter().for_each(|node| self.count(*node));
+                        }
+                        Element::BehaviouralVoltage { law }
+                        | Element::BehaviouralCurrent { law } => self.expr(law),
+                        _ => {}
+                    }
+                }
+                CardKind::Initial(values) => values.iter().for_each(|(node, _)| self.count(*node)),
+                CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| self.expr(expr)),
+                _ => {}
+            }
+        }
+        let once =
+            |counts: &[(u32, u8)], name: &Name| counts.get(name.0 as usize) == Some(&(own, 1));
+        for card in cards {
+            let CardKind::Device(device) = &card.kind else { continue };
+            if matches!(device.element, Element::Instance { .. }) {
+                // An output of a subcircuit that nobody needs.
+                continue;
+            }
+            for node in &device.nodes {
+                if once(&self.counts, node) && netlist.names.text(*node) != "0" {
+                    self.found += 1;
+                    if self.found <= MOST {
+                        d.push(self.warning(netlist, *node, card.span, own));
+                    }
+                }
+            }
+        }
+        for card in cards {
+            if let CardKind::Subcircuit(subcircuit) = &card.kind {
+                // A terminal is named outside as well.
+                self.scope(netlist, &subcircuit.cards, &subcircuit.ports, d);
+            }
+        }
+    }
+
+    fn warning(&self, netlist: &Netlist, node: Name, span: Span, scope: u32) -> Diagnostic {
+        let text = netlist.names.text(node);
+        let known = (0..self.counts.len().min(NEAR) as u32).map(Name).filter(|name| {
+            *name != node
+                && self
+                    .counts
+                    .get(name.0 as usize)
+                    .is_some_and(|(own, count)| *own == scope && *count > 0)
+        });
+        let warning =
+            Diagnostic::warning("W0731", span, format!("the node `{text}` is named only once"));
+        match nearest(text, known.map(|name| netlist.names.text(name))) {
+            Some(near) => warning.help(format!("did you mean `{near}`?")),
+            None => warning,
+        }
+    }
+}

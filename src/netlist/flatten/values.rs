@@ -1,0 +1,204 @@
+//! Expressions over names become expressions over nodes and devices.
+
+use super::expand::Flat;
+use super::scope::{self, ScopeId};
+use crate::circuit::{self, DeviceId, NodeId};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Node;
+use crate::netlist::{Expr, Leaf, Name, Names};
+use crate::quantity::nearest;
+use crate::source::Span;
+use std::collections::HashMap;
+
+/// Among so many names the nearest is looked for; in bigger decks that would take too long.
+pub const NEAR: usize = 20_000;
+
+/// So many messages name the nearest name; then the names are not what is wrong.
+const HELPED: usize = 100;
+
+/// How many names to look at.
+pub fn near(d: &[Diagnostic]) -> usize {
+    if d.len() < HELPED { NEAR } else { 0 }
+}
+
+/// Looks names up in a flat netlist.
+pub struct Lookup<'f, 'n> {
+    /// The netlist.
+    pub flat: &'f Flat<'n>,
+    /// The names: those of the netlist, or a copy with those of the header's columns.
+    pub names: &'f Names,
+    /// Nodes by their full names, folded; made when first asked for.
+    paths: std::cell::OnceCell<Paths>,
+}
+
+struct Paths {
+    nodes: HashMap<String, NodeId>,
+    devices: HashMap<String, DeviceId>,
+}
+
+impl<'f, 'n> Lookup<'f, 'n> {
+    /// A lookup with the names of the netlist.
+    pub fn new(flat: &'f Flat<'n>, names: &'f Names) -> Lookup<'f, 'n> {
+        Lookup { flat, names, paths: std::cell::OnceCell::new() }
+    }
+
+    fn paths(&self) -> &Paths {
+        self.paths.get_or_init(|| {
+            let nodes = self.flat.nodes.iter().enumerate();
+            let devices = self.flat.devices.iter().enumerate();
+            Paths {
+                nodes: nodes
+                    .map(|(k, node)| (node.name.to_lowercase(), NodeId(k as u32)))
+                    .collect(),
+                devices: devices
+                    .map(|(k, pending)| {
+                        (self.flat.device_name(pending).to_lowercase(), DeviceId(k as u32))
+                    })
+                    .collect(),
+            }
+        })
+    }
+
+    /// The value of an expression that must be a number.
+    pub fn number(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<f64> {
+        scope::number(&self.flat.scopes, id, expr, self.names, d)
+    }
+
+    /// A node by its name in a scope, or by its full one (`x1.out`).
+    pub fn node(
+        &self,
+        id: ScopeId,
+        name: Name,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<NodeId> {
+        let text = self.names.text(name);
+        if text == "0" {
+            return Some(NodeId(0));
+        }
+        let scope = self.flat.scopes.get(id);
+        if let Some(node) = scope.nodes.get(&name) {
+            return Some(*node);
+        }
+        if text.contains('.') {
+            let path = format!("{}{text}", scope.path).to_lowercase();
+            if let Some(node) = self.paths().nodes.get(&path) {
+                return Some(*node);
+            }
+        }
+        let near = nearest(
+            text,
+            self.flat.nodes.iter().skip(1).take(near(d)).map(|node| node.name.as_str()),
+        );
+        let error =
+            Diagnostic::error("E0740", span, format!("no device stands at a node `{text}`"));
+        d.push(match near {
+            Some(near) => error.help(format!("did you mean `{near}`?")),
+            None => error,
+        });
+        None
+    }
+
+    /// A device by its name in a scope, or by its full one: `x1.l1`, or as ngspice writes it, `l.x1.l1`.
+    pub fn device(
+        &self,
+        id: ScopeId,
+        name: Name,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<DeviceId> {
+        let text = self.names.text(name);
+        let scope = self.flat.scopes.get(id);
+        let here = |device: &&DeviceId| {
+            // The name of an instance stands before the number of its first device.
+            self.flat
+                .devices
+                .get(device.0 as usize)
+                .is_some_and(|pending| pending.device.name == name && pending.scope == id)
+        };
+        if let Some(device) = scope.devices.get(&name).filter(here) {
+            return Some(*device);
+        }
+        if let Some((first, rest)) = text.split_once('.') {
+            let path = format!("{}{text}", scope.path).to_lowercase();
+            let short = format!("{}{rest}", scope.path).to_lowercase();
+            let devices = &self.paths().devices;
+            let found =
+                devices.get(&path).or_else(|| devices.get(&short).filter(|_| first.len() == 1));
+            if let Some(device) = found {
+                return Some(*device);
+            }
+        }
+        let known: Vec<String> = self
+            .flat
+            .devices
+            .iter()
+            .take(near(d))
+            .map(|pending| self.flat.device_name(pending))
+            .collect();
+        let error = Diagnostic::error("E0741", span, format!("no device is called `{text}`"));
+        d.push(match nearest(text, known.iter().map(String::as_str)) {
+            Some(near) => error.help(format!("did you mean `{near}`?")),
+            None => error,
+        });
+        None
+    }
+
+    /// An expression of a scope over nodes and devices.
+    pub fn law(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<circuit::Expr> {
+        let before = d.len();
+        let law = expr.map(&mut |leaf, span| {
+            let node = match leaf {
+                Leaf::Parameter(name) => {
+                    let value = self
+                        .flat
+                        .scopes
+                        .parameter(id, *name)
+                        .or_else(|| scope::constant(self.names.text(*name)));
+                    if value.is_none() {
+                        let error = scope::unknown_parameter(
+                            &self.flat.scopes,
+                            id,
+                            *name,
+                            span,
+                            self.names,
+                            near(d),
+                        );
+                        d.push(error);
+                    }
+                    Node::Number(value.unwrap_or(f64::NAN))
+                }
+                Leaf::Voltage(plus, minus) => {
+                    let plus = self.node(id, *plus, span, d);
+                    let minus =
+                        minus.map_or(Some(NodeId(0)), |minus| self.node(id, minus, span, d));
+                    let ground = NodeId(0);
+                    Node::Leaf(circuit::Leaf::Voltage(
+                        plus.unwrap_or(ground),
+                        minus.unwrap_or(ground),
+                    ))
+                }
+                Leaf::Current(device) => match self.device(id, *device, span, d) {
+                    Some(device) => Node::Leaf(circuit::Leaf::Current(device)),
+                    None => Node::Number(f64::NAN),
+                },
+                Leaf::Time => Node::Leaf(circuit::Leaf::Time),
+            };
+            circuit::Expr::new(node, span)
+        });
+        (d.len() == before).then_some(law)
+    }
+}
+
+impl Flat<'_> {
+    /// The full name of a device: `r1`, `x1.r1`.
+    pub fn device_name(&self, pending: &super::expand::Pending) -> String {
+        let own = self.netlist.names.text(pending.device.name);
+        let path = &self.scopes.get(pending.scope).path;
+        match pending.pair {
+            (0, 0 | 1) => format!("{path}{own}"),
+            // Further pairs of one K.
+            (first, second) => format!("{path}{own}#{}_{}", first + 1, second + 1),
+        }
+    }
+}
