@@ -31,6 +31,46 @@ fn code(output: &Output) -> i32 {
     output.status.code().expect("the program ends by itself")
 }
 
+/// What is said about a bad file, and the exit code.
+fn said(file: &str) -> String {
+    let command = if file.ends_with(".bg") { "check" } else { "simulate" };
+    let output = bondspice(&folder("tests/bad"), &[command, file]);
+    assert!(output.stdout.is_empty(), "{file}: {}", stdout(&output));
+    format!("{}exit code {}\n", stderr(&output), code(&output))
+}
+
+/// One test for each bad file, so that all are seen at once.
+macro_rules! bad {
+    ($($name:ident: $file:literal = $code:literal)*) => { $(
+        #[test]
+        fn $name() {
+            let text = said($file);
+            assert!(text.ends_with(concat!("exit code ", $code, "\n")), "{text}");
+            assert!(!text.contains("panicked"), "{text}");
+            insta::assert_snapshot!(text);
+        }
+    )* };
+}
+
+bad! {
+    n1_two_effort_sources: "n1_two_effort_sources.bg" = 3
+    n2_two_flow_sources: "n2_two_flow_sources.bg" = 3
+    n3_port_used_twice: "n3_port_used_twice.bg" = 3
+    n4_unknown_port: "n4_unknown_port.bg" = 3
+    n5_two_port_one_bond: "n5_two_port_one_bond.bg" = 3
+    n6_transformer_two_efforts: "n6_transformer_two_efforts.bg" = 3
+    unknown_unit: "unknown_unit.bg" = 3
+    missing_parameter: "missing_parameter.bg" = 3
+    unclosed_bracket: "unclosed_bracket.bg" = 3
+    empty: "empty.bg" = 3
+    binary: "binary.bg" = 3
+    not_utf8: "not_utf8.bg" = 3
+    missing_file: "n1_two_effort_source.bg" = 5
+    no_ground: "no_ground.cir" = 3
+    floating_node: "floating_node.cir" = 3
+    voltage_loop: "voltage_loop.cir" = 3
+}
+
 /// A folder with two traces that differ by 1 % of range in `y`.
 fn traces() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -118,4 +158,274 @@ fn help_and_version_are_answers() {
     let output = bondspice(&here, &["compar"]);
     assert_eq!(code(&output), 2);
     assert!(output.stdout.is_empty() && stderr(&output).contains("tip:"));
+}
+
+/// A folder with a model of each kind.
+fn models() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let rlc = "# a series RLC circuit\nSe:U(10 V) -> 1:mesh\nmesh -> I:L(1 mH), R:R(2 Ohm), C:C(100 uF)\n\
+        simulate until 20 ms step 10 us\nobserve f(mesh) in mA as \"current\", e(C)\n";
+    std::fs::write(folder.path().join("rlc.bg"), rlc).unwrap();
+    let rc = "a discharge\n.param R=1k\nC1 out 0 1u IC=1\nR1 out 0 {R}\n.tran 10u 5m uic\n.print tran v(out)\n.end\n";
+    std::fs::write(folder.path().join("rc.cir"), rc).unwrap();
+    folder
+}
+
+/// The rows of a CSV, without its header.
+fn rows(text: &str) -> Vec<Vec<f64>> {
+    let row = |line: &str| line.split(',').map(|field| field.parse().unwrap()).collect();
+    text.lines().skip(1).map(row).collect()
+}
+
+#[test]
+fn a_bond_graph_runs_into_a_table() {
+    let folder = models();
+    let output = bondspice(folder.path(), &["simulate", "rlc.bg", "-q"]);
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+    let text = stdout(&output);
+    assert_eq!(text.lines().next(), Some("time,current,e(C)"));
+    let rows = rows(&text);
+    assert_eq!(rows.len(), 2001);
+    // u'' + (R/L)·u' + u/(L·C) = U/(L·C), from rest: decay 1000/s, ω = 3000/s.
+    let (a, w) = (1000.0_f64, 3000.0_f64);
+    for row in rows {
+        let t = row[0];
+        let (decay, (sin, cos)) = ((-a * t).exp(), (w * t).sin_cos());
+        let u = 10.0 * (1.0 - decay * (cos + a / w * sin));
+        let i = 10.0 / (w * 1e-3) * decay * sin;
+        assert!((row[2] - u).abs() < 1e-3 && (row[1] - 1e3 * i).abs() < 1e-4 * 2.5e3, "{row:?}");
+    }
+}
+
+#[test]
+fn units_formats_and_files() {
+    let folder = models();
+    let run = |arguments: &[&str]| bondspice(folder.path(), arguments);
+    let output = run(&["simulate", "rlc.bg", "-q", "--units", "-o", "run.csv"]);
+    assert_eq!((code(&output), stdout(&output)), (0, String::new()));
+    let csv = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    assert_eq!(csv.lines().next(), Some("time [s],current [mA],e(C) [V]"));
+    for name in ["run.raw", "run.json"] {
+        assert_eq!(code(&run(&["simulate", "rlc.bg", "-q", "-o", name])), 0);
+        let same = run(&["compare", name, "run.csv", "--tolerance", "0"]);
+        assert_eq!(code(&same), 0, "{}", stdout(&same));
+    }
+    assert_eq!(code(&run(&["simulate", "rlc.bg", "-o", "run.xyz"])), 2);
+    assert_eq!(code(&run(&["simulate", "rlc.bg", "-o", "rlc.bg", "--format", "csv"])), 5);
+    assert_eq!(code(&run(&["simulate", "rlc.bg", "-o", "no/such/folder.csv"])), 5);
+    let left: Vec<_> =
+        std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 5, "{left:?}");
+}
+
+#[test]
+fn the_command_line_beats_the_file() {
+    let folder = models();
+    let run = |arguments: &[&str]| {
+        let output = bondspice(folder.path(), arguments);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        stdout(&output)
+    };
+    let text = run(&[
+        "simulate",
+        "rlc.bg",
+        "-q",
+        "--until",
+        "1ms",
+        "--step",
+        "0.5 ms",
+        "--observe",
+        "e(R) as \"u\"",
+    ]);
+    assert_eq!(text.lines().next(), Some("time,u"));
+    assert_eq!(rows(&text).iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 0.0005, 0.001]);
+    let text = run(&["simulate", "rc.cir", "-q", "--set", "R=2k", "--step", "1ms"]);
+    assert_eq!(text.lines().next(), Some("time,v(out)"));
+    for row in rows(&text) {
+        assert!((row[1] - (-row[0] / 2e-3).exp()).abs() < 2e-3, "{row:?}");
+    }
+    std::fs::write(folder.path().join("times"), "0\n\n0.0001\n0.00025\n").unwrap();
+    let text = run(&["simulate", "rc.cir", "-q", "--times", "times", "--option", "reltol=1e-8"]);
+    let rows = rows(&text);
+    assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 1e-4, 2.5e-4]);
+    assert!((rows[2][1] - (-0.25_f64).exp()).abs() < 1e-6, "{rows:?}");
+}
+
+#[test]
+fn standard_input_is_read_and_told_apart() {
+    let folder = models();
+    for (name, header) in [("rlc.bg", "time,current,e(C)"), ("rc.cir", "time,v(out)")] {
+        let file = std::fs::File::open(folder.path().join(name)).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_bondspice"))
+            .args(["simulate", "-", "-q"])
+            .stdin(file)
+            .output()
+            .unwrap();
+        assert_eq!(stdout(&output).lines().next(), Some(header), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn our_own_netlist_gives_the_same_run() {
+    let folder = models();
+    let run = |arguments: &[&str]| bondspice(folder.path(), arguments);
+    assert_eq!(code(&run(&["convert", "rlc.bg", "-q", "-o", "rlc.cir", "--map", "map.json"])), 0);
+    assert_eq!(code(&run(&["simulate", "rlc.bg", "-q", "-o", "bg.csv"])), 0);
+    assert_eq!(code(&run(&["simulate", "rlc.cir", "-q", "-o", "cir.csv"])), 0);
+    let same = run(&["compare", "cir.csv", "bg.csv", "--tolerance", "1e-12"]);
+    assert_eq!(code(&same), 0, "{}", stdout(&same));
+    let map: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("map.json")).unwrap())
+            .unwrap();
+    assert_eq!(map["schema"], 1);
+    for key in ["dialect", "variables", "cards", "figures"] {
+        assert!(map.get(key).is_some(), "{key}");
+    }
+}
+
+#[test]
+fn another_simulators_result_gets_our_names() {
+    let folder = models();
+    let run = |arguments: &[&str]| bondspice(folder.path(), arguments);
+    assert_eq!(code(&run(&["convert", "rlc.bg", "-q", "-o", "rlc.cir", "--map", "map.json"])), 0);
+    let ngspice = Command::new("ngspice")
+        .args(["-b", "-r", "rlc.raw", "rlc.cir"])
+        .current_dir(folder.path())
+        .output();
+    if ngspice.is_err() {
+        let required = std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_some_and(|v| v == "1");
+        assert!(!required, "ngspice is required and cannot be run");
+        eprintln!("skipped: ngspice cannot be run");
+        return;
+    }
+    let renamed = run(&["trace", "rlc.raw", "--map", "map.json", "-o", "peer.csv"]);
+    assert_eq!(code(&renamed), 0, "{}", stderr(&renamed));
+    let peer = std::fs::read_to_string(folder.path().join("peer.csv")).unwrap();
+    assert_eq!(peer.lines().next(), Some("time,current,e(C)"));
+    assert_eq!(code(&run(&["simulate", "rlc.bg", "-q", "-o", "bg.csv"])), 0);
+    let same = run(&["compare", "peer.csv", "bg.csv", "--tolerance", "1e-3"]);
+    assert_eq!(code(&same), 0, "{}", stdout(&same));
+}
+
+#[test]
+fn verdicts_end_with_0_and_1() {
+    let folder = models();
+    let run = |arguments: &[&str]| bondspice(folder.path(), arguments);
+    let verified = run(&["verify", "rlc.bg", "--format", "json"]);
+    assert_eq!(code(&verified), 0, "{}", stderr(&verified));
+    let report: serde_json::Value = serde_json::from_str(&stdout(&verified)).unwrap();
+    assert_eq!((&report["schema"], &report["verdict"]), (&1.into(), &"pass".into()));
+    assert_eq!(code(&run(&["check", "rlc.bg", "--deny", "warnings"])), 0);
+    // Two compliances on one junction: one of them depends on the other.
+    let text = "Se:U(1 V) -> 1:m -> R:R(1 Ohm)\nm -> 0:n -> C:a(1 F)\nn -> C:b(2 F)\nsimulate until 1 s step 1 ms\n";
+    std::fs::write(folder.path().join("dependent.bg"), text).unwrap();
+    assert_eq!(code(&run(&["check", "dependent.bg"])), 0);
+    let denied = run(&["check", "dependent.bg", "--deny", "warnings"]);
+    assert_eq!(code(&denied), 1, "{}", stderr(&denied));
+    let causality = run(&["causality", "dependent.bg", "--format", "json"]);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&causality)).unwrap();
+    assert_eq!(report["order"], 1);
+    for key in ["bonds", "states", "derivative", "loops", "conflicts"] {
+        assert!(report[key].is_array(), "{key}");
+    }
+}
+
+#[test]
+fn statistics_are_json_on_stderr() {
+    let folder = models();
+    let output =
+        bondspice(folder.path(), &["simulate", "rlc.bg", "-q", "--stats", "json", "-o", "x.csv"]);
+    let statistics: serde_json::Value = serde_json::from_str(&stderr(&output)).unwrap();
+    for key in
+        ["accepted", "rejected", "evaluations", "factorisations", "solves", "events", "method"]
+    {
+        assert!(statistics.get(key).is_some(), "{key} in {statistics}");
+    }
+}
+
+#[test]
+fn what_cannot_be_written_yet_is_said() {
+    let folder = models();
+    for simulator in ["xyce", "ltspice", "gnucap", "saber", "spectre"] {
+        let output = bondspice(folder.path(), &["convert", "rlc.bg", "--to", simulator]);
+        assert_eq!(code(&output), 2);
+        assert!(output.stdout.is_empty() && stderr(&output).contains(simulator));
+    }
+}
+
+#[test]
+fn every_stage_prints() {
+    let folder = models();
+    for stage in ["graph", "causality", "netlist", "circuit", "system"] {
+        let output = bondspice(folder.path(), &["simulate", "rlc.bg", "-q", "--emit", stage]);
+        assert_eq!(code(&output), 0, "{stage}: {}", stderr(&output));
+        insta::assert_snapshot!(stage, stdout(&output));
+    }
+}
+
+#[test]
+fn ten_thousand_brackets_are_refused() {
+    let folder = models();
+    let (open, close) = ("(".repeat(10_000), ")".repeat(10_000));
+    let graph = format!("Se:U(1 V) -> R:R({open}1 Ohm{close})\nsimulate until 1 s step 1 ms\n");
+    std::fs::write(folder.path().join("deep.bg"), graph).unwrap();
+    let deck = format!("deep\nB1 a 0 V={open}1{close}\nR1 a 0 1\n.op\n.end\n");
+    std::fs::write(folder.path().join("deep.cir"), deck).unwrap();
+    for name in ["deep.bg", "deep.cir"] {
+        let output = bondspice(folder.path(), &["simulate", name]);
+        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        insta::assert_snapshot!(name.replace('.', "_"), stderr(&output));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_broken_pipe_is_silent() {
+    let folder = models();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bondspice"))
+        .args(["simulate", "rlc.bg", "-q", "--step", "1us", "--until", "100ms"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_what_was_computed() {
+    use std::io::Read;
+    let folder = models();
+    std::fs::write(folder.path().join("run.csv"), "precious\n").unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bondspice"))
+        .args(["simulate", "rlc.bg", "--step", "1us", "--until", "10000s", "-o", "run.csv"])
+        .current_dir(folder.path())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let hidden = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap());
+        let begun = |e: &std::fs::DirEntry| e.metadata().is_ok_and(|m| m.len() > 100_000);
+        entries.into_iter().any(|e| e.file_name().to_string_lossy().ends_with(".tmp") && begun(&e))
+    };
+    for _ in 0..1000 {
+        if hidden(folder.path()) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let status = child.wait().unwrap();
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(status.code(), Some(130), "{said}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("run.csv")).unwrap(), "precious\n");
+    let partial = std::fs::read_to_string(folder.path().join("run.csv.partial")).unwrap();
+    assert!(partial.starts_with("time,current,e(C)\n0,0,0\n"), "{}", &partial[..200]);
+    assert!(partial.ends_with('\n'));
+    assert!(!hidden(folder.path()));
 }

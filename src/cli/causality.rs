@@ -7,7 +7,8 @@ use super::session::{Exit, Session};
 use crate::bond::causality;
 
 /// What it does, in a line.
-pub const ABOUT: &str = "Show causal strokes, states, dependent storages, algebraic loops, conflicts";
+pub const ABOUT: &str =
+    "Show causal strokes, states, dependent storages, algebraic loops, conflicts";
 
 /// An example for the help.
 pub const EXAMPLE: &str = "A stroke stands at the end that receives the effort: a ->| b means that a imposes the \

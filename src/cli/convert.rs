@@ -71,7 +71,9 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     let text = write::write(&model.translation.netlist);
     write_text(arguments.output.as_deref(), &text, session)?;
     if let Some(name) = &arguments.map {
-        let map = serde_json::to_string_pretty(&model.translation.map.to_json());
+        let map = serde_json::to_string_pretty(
+            &model.translation.map.json(&model.translation.netlist.names),
+        );
         write_text(Some(name), &(map.unwrap_or_default() + "\n"), session)?;
     }
     Ok(())

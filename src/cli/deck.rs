@@ -87,7 +87,9 @@ pub fn observe(netlist: &mut Netlist, list: Option<&str>, d: &mut Vec<Diagnostic
     if list.trim() != "all" {
         for (text, name) in items_of(list) {
             let text = text.replace(' ', "");
-            let Some(read) = cards(&format!(".print tran {text}"), "--observe", d) else { continue };
+            let Some(read) = cards(&format!(".print tran {text}"), "--observe", d) else {
+                continue;
+            };
             let saved = read.cards.iter().find_map(|card| match &card.kind {
                 CardKind::Save { items, .. } => items.first(),
                 _ => None,

@@ -69,7 +69,7 @@ pub fn graph(graph: &BondGraph) -> String {
     }
     let mut bonds = Table::new(&["bond", "domain"]);
     for id in graph.bond_ids() {
-        bonds.row([graph.bond_name(id), format!("{:?}", graph.bond(id).domain)]);
+        bonds.row([graph.bond_name(id), graph.bond(id).domain.name().to_string()]);
     }
     let mut observed = Table::new(&["observed", "value", "unit"]);
     for item in &graph.experiment.observe {
@@ -85,7 +85,8 @@ pub fn graph(graph: &BondGraph) -> String {
         run.row([key.clone(), value.clone()]);
     }
     let tables = [parameters, signals, vertices, bonds, observed, run];
-    let tables: Vec<String> = tables.iter().map(Table::to_text).collect();
+    let tables: Vec<String> =
+        tables.iter().filter(|table| !table.is_empty()).map(Table::to_text).collect();
     format!("graph {}\n\n{}", graph.name, tables.join("\n"))
 }
 

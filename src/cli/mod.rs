@@ -4,7 +4,18 @@ pub mod session;
 pub mod output;
 pub mod table;
 pub mod emit;
+pub mod flags;
+pub mod watch;
+pub mod deck;
+pub mod pipeline;
+pub mod list;
+pub mod check;
+pub mod convert;
+pub mod simulate;
+pub mod verify;
 pub mod compare;
+pub mod causality;
+pub mod trace;
 
 use clap::{Args, FromArgMatches};
 use session::{Exit, Global, Session};
@@ -40,7 +51,15 @@ macro_rules! command {
 }
 
 /// All subcommands, in the order of the help.
-pub const COMMANDS: &[Command] = &[command!(compare)];
+pub const COMMANDS: &[Command] = &[
+    command!(check),
+    command!(convert),
+    command!(simulate),
+    command!(verify),
+    command!(compare),
+    command!(causality),
+    command!(trace),
+];
 
 /// The whole command line, as clap knows it.
 pub fn describe() -> clap::Command {

@@ -4,7 +4,7 @@ use super::emit::{self, Stage};
 use super::session::{Exit, Session};
 use crate::bond::causality::{self, Causality};
 use crate::bond::elaborate::{self, Overrides};
-use crate::bond::graph::BondGraph;
+use crate::bond::graph::{BondGraph, Observation};
 use crate::bond::initial::{self, InitialState};
 use crate::bond::syntax;
 use crate::circuit::stamps::{self, Stamps};
@@ -12,10 +12,11 @@ use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::netlist::header::Header;
 use crate::netlist::{Netlist, flatten, read, write};
-use crate::sim::{self, Failure, Settings, Statistics, System};
+use crate::sim::{self, Failure, FailureKind, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
 use crate::trace::{Sink, Trace};
 use crate::translate::{self, Translation};
+use crate::verify::{self, Report};
 
 /// What a text is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +99,19 @@ pub fn model(
     Some(Model { graph, causality, initial, translation })
 }
 
+impl Model {
+    /// The flat circuit, and the units of its columns by name.
+    pub fn circuit(&self, d: &mut Vec<Diagnostic>) -> Option<(Circuit, Units)> {
+        let circuit = flatten::flatten(&self.translation.netlist, d)?;
+        let unit = |item: &Observation| match item.unit.0.as_str() {
+            "" => item.si_unit.clone(),
+            unit => unit.to_string(),
+        };
+        let items = self.graph.experiment.observe.iter();
+        Some((circuit, items.map(|item| (item.name.clone(), unit(item))).collect()))
+    }
+}
+
 /// From a text of either language to its flat circuit, and the units of its columns by name.
 pub fn circuit(
     map: &SourceMap,
@@ -106,16 +120,7 @@ pub fn circuit(
     d: &mut Vec<Diagnostic>,
 ) -> Option<(Circuit, Units)> {
     match language(map, file) {
-        Language::Bond => {
-            let model = model(map, file, overrides, d)?;
-            let circuit = flatten::flatten(&model.translation.netlist, d)?;
-            let items = model.graph.experiment.observe.iter();
-            let unit = |item: &crate::bond::graph::Observation| match item.unit.0.as_str() {
-                "" => item.si_unit.clone(),
-                unit => unit.to_string(),
-            };
-            Some((circuit, items.map(|item| (item.name.clone(), unit(item))).collect()))
-        }
+        Language::Bond => model(map, file, overrides, d)?.circuit(d),
         Language::Netlist => {
             let mut netlist = read::read(map, file, d);
             if has_errors(d) {
@@ -192,6 +197,17 @@ pub fn prepare(
 ) -> Option<Run> {
     let native = language(map, file) == Language::Bond;
     let (circuit, units) = circuit(map, file, overrides, d)?;
+    ready(circuit, &units, native, pick, d)
+}
+
+/// Makes a circuit ready to run. `native`: it comes from a bond graph.
+pub fn ready(
+    circuit: Circuit,
+    units: &Units,
+    native: bool,
+    pick: Option<Pick>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
     let stamps = stamps::stamp(&circuit, d)?;
     let point = match pick {
         Some(pick) => pick == Pick::Op,
@@ -201,7 +217,7 @@ pub fn prepare(
     let system = sim::compile(&stamps, d)?;
     let mut names: Vec<String> = if point { vec![] } else { vec!["time".into()] };
     names.extend(stamps.outputs.iter().map(|(name, _)| name.clone()));
-    let unit = |name: &String| if name == "time" { "s".into() } else { unit_of(name, &units) };
+    let unit = |name: &String| if name == "time" { "s".into() } else { unit_of(name, units) };
     let units = names.iter().map(unit).collect();
     for (at, name) in names.iter().enumerate() {
         if names[..at].contains(name) {
@@ -225,7 +241,16 @@ impl Run {
             Some(settings) => sim::transient(&self.system, settings, sink),
             None => {
                 let point = sim::operating_point(&self.system)?;
-                super::deck::write_point(&self.system, &point, sink)
+                sink.row(&point.outputs).map_err(|error| {
+                    let message = format!("the row cannot be written: {error}");
+                    Failure {
+                        kind: FailureKind::Output,
+                        diagnostic: Box::new(Diagnostic::error("E0905", Span::NONE, message)),
+                        time: 0.0,
+                        statistics: Box::new(point.statistics.clone()),
+                    }
+                })?;
+                Ok(point.statistics)
             }
         }
     }
@@ -298,4 +323,43 @@ pub fn emit(
         (Some(text), Exit::Fine) => Ok(text),
         (_, exit) => Err(exit),
     }
+}
+
+/// Both routes over one experiment, judged. `adapt` may change how the circuit is run. `Ok(None)` when there were
+/// errors.
+///
+/// # Errors
+/// Why the circuit's run did not reach its end.
+pub fn verify(
+    map: &SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+    adapt: impl FnOnce(&mut Settings),
+) -> Result<Option<Report>, FailureKind> {
+    let demands = verify::Settings::default();
+    let mut overrides = overrides.clone();
+    if language(map, file) != Language::Bond {
+        let message = "only a bond graph can be verified";
+        d.push(Diagnostic::error("E0944", Span::NONE, message));
+        return Ok(None);
+    }
+    if !overrides.options.iter().any(|(key, _)| key.eq_ignore_ascii_case("reltol")) {
+        overrides.options.push(("reltol".into(), format!("{:e}", demands.reltol)));
+    }
+    let Some(model) = model(map, file, &overrides, d) else { return Ok(None) };
+    let circuit = model.circuit(d);
+    let run = circuit.and_then(|(circuit, units)| ready(circuit, &units, true, None, d));
+    let Some(mut run) = run else { return Ok(None) };
+    if let Some(settings) = &mut run.settings {
+        adapt(settings);
+    }
+    let mut trace = run.trace();
+    if let Err(failure) = run.go(&mut trace) {
+        if failure.kind != FailureKind::Interrupted {
+            d.push(*failure.diagnostic);
+        }
+        return Err(failure.kind);
+    }
+    Ok(verify::judge(&model.graph, &model.causality, &trace, &demands, d))
 }

@@ -18,6 +18,11 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
+    /// Whether it has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
     /// The table as text, each line ended; a column of numbers is set to the right.
     pub fn to_text(&self) -> String {
         let cell = |row: &Vec<String>, at: usize| row.get(at).cloned().unwrap_or_default();

@@ -9,6 +9,7 @@ use crate::source::{SourceMap, Span};
 use crate::trace::formats::Heading;
 use crate::trace::{Sink, Trace};
 use serde::Deserialize;
+use std::collections::HashSet;
 
 /// What it does, in a line.
 pub const ABOUT: &str = "Rename another simulator's result into bond-graph names and units";
@@ -34,6 +35,9 @@ pub struct Arguments {
     /// Head columns as `name [unit]`
     #[arg(long)]
     units: bool,
+    /// Every variable of the map, not only the observed ones
+    #[arg(long)]
+    all: bool,
 }
 
 /// The part of a map that is read here.
@@ -45,11 +49,13 @@ struct Map {
 #[derive(Deserialize)]
 struct Variable {
     bg: String,
-    expr: String,
+    expr: Option<String>,
     #[serde(default = "one")]
     factor: f64,
     #[serde(default)]
     unit: String,
+    #[serde(default)]
+    observed: bool,
 }
 
 fn one() -> f64 {
@@ -68,11 +74,12 @@ fn rename_file(arguments: &Arguments, session: &mut Session) -> Result<(), Exit>
     let mut trace = session.load_trace(&arguments.trace)?;
     if let Some(name) = &arguments.map {
         let text = session.load_text(name)?;
-        let map: Map = serde_json::from_str(&text).map_err(|error| {
+        let mut map: Map = serde_json::from_str(&text).map_err(|error| {
             let message = format!("`{name}` is no map of variables");
             let diagnostic = Diagnostic::error("E0930", Span::NONE, message);
             session.fail(diagnostic.because(error.to_string()))
         })?;
+        choose(&mut map, arguments.all);
         let mut d = vec![];
         let renamed = rename(&trace, &map, &mut d);
         session.say(d);
@@ -92,6 +99,16 @@ fn rename_file(arguments: &Arguments, session: &mut Session) -> Result<(), Exit>
     output.close(true, session)
 }
 
+/// Leaves the variables that are wanted and held by the circuit, each name once.
+fn choose(map: &mut Map, all: bool) {
+    let only = !all && map.variables.iter().any(|variable| variable.observed);
+    let mut seen = HashSet::new();
+    map.variables.retain(|variable| {
+        let wanted = variable.expr.is_some() && (variable.observed || !only);
+        wanted && seen.insert(variable.bg.clone())
+    });
+}
+
 /// The variables of a map over the columns of a trace. Variables that need a column which the trace lacks are left
 /// out, with a note.
 fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
@@ -108,7 +125,8 @@ fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
             _ => None,
         });
         let Some(law) = law else {
-            let message = format!("`{}` of `{}` is no expression", variable.expr, variable.bg);
+            let text = variable.expr.as_deref().unwrap_or("");
+            let message = format!("`{text}` of `{}` is no expression", variable.bg);
             d.push(Diagnostic::error("E0930", Span::NONE, message));
             return None;
         };
@@ -141,7 +159,7 @@ fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
 fn expressions(map: &Map) -> (Netlist, Vec<Option<usize>>) {
     let mut text = String::from("map\n");
     for (at, variable) in map.variables.iter().enumerate() {
-        let line = variable.expr.replace(['\n', '\r'], " ");
+        let line = variable.expr.as_deref().unwrap_or("").replace(['\n', '\r'], " ");
         text += &format!("B_{at} x_ 0 V={line}\n");
     }
     let mut sources = SourceMap::default();

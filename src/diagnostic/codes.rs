@@ -176,9 +176,17 @@ pub const CODES: &[Code] = &[
     row("E0924", "trace has no rows", "There is a header, or nothing at all, and no row of numbers."),
     row("E0925", "two columns of one name", "Columns are told apart by their names. Give one of them another name with `as`."),
     row("E0926", "time falls", "The first column of a trace must not decrease, and must hold numbers."),
+    row("E0930", "not a map of variables", "`bondspice convert --map` writes the map: JSON with `variables`, each with `bg`, `expr`, `factor` and `unit`."),
+    row("E0932", "map does not fit the result", "None of the map's circuit variables has a column in the result. Is it the map of the netlist that was run?"),
+    row("E0933", "not a list of times", "A list of times has one time in seconds a line, rising from 0 on."),
     row("E0940", "wrong use of a flag", "The message says which flag and what it takes; `--help` shows an example."),
     row("E0941", "unknown format", "The format of a result follows from --format, else from the ending of -o: csv, raw, json."),
     row("E0942", "nothing to compare", "No signal of the reference has a column in the trace. Pair names that differ with --signals."),
+    row("E0943", "simulator or dialect that is not known yet", "Netlists are written for and read as ngspice's; others are planned."),
+    row("E0944", "flag that does not fit the input", "Netlists have parameters and columns but no inputs, graph or causality; bond graphs have all of them."),
+    row("E0945", "two columns of one name", "The headers of a result must differ. Give one of the columns another name with `as`."),
+    row("W0931", "result lacks variables of the map", "Some variables of the map need circuit variables that the simulator did not keep; they are left out. `.save all` keeps everything."),
+    row("N0946", "one of several analyses is run", "A netlist asks for several analyses and the last is run. Pick another with --analysis."),
 ];
 
 /// The row of a code.

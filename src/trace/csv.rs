@@ -20,12 +20,12 @@ impl<W: Write> Rows<W> {
         for (at, name) in names.iter().enumerate() {
             match units.get(at) {
                 Some(unit) if heading.units && !unit.is_empty() => {
-                    writer.write_field(format!("{name} [{unit}]"))?;
+                    writer.write_field(format!("{name} [{unit}]")).map_err(plain)?;
                 }
-                _ => writer.write_field(name)?,
+                _ => writer.write_field(name).map_err(plain)?,
             }
         }
-        writer.write_record(None::<&[u8]>)?;
+        writer.write_record(None::<&[u8]>).map_err(plain)?;
         Ok(Rows { writer, digits: String::new() })
     }
 
@@ -43,16 +43,24 @@ impl<W: Write> Sink for Rows<W> {
         for value in values {
             self.digits.clear();
             number(*value, &mut self.digits);
-            self.writer.write_field(&self.digits)?;
+            self.writer.write_field(&self.digits).map_err(plain)?;
         }
-        self.writer.write_record(None::<&[u8]>)?;
-        Ok(())
+        self.writer.write_record(None::<&[u8]>).map_err(plain)
     }
 }
 
-/// Appends the shortest decimal number that reads back as the same value.
+/// The system's own error, whose kind says whether a pipe is broken.
+fn plain(error: ::csv::Error) -> io::Error {
+    match error.into_kind() {
+        ::csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// Appends the shortest decimal number that reads back as the same value; zero has no sign.
 pub fn number(value: f64, text: &mut String) {
     use std::fmt::Write;
+    let value = if value == 0.0 { 0.0 } else { value };
     let size = value.abs();
     // Writing to a String cannot fail.
     let _ = if value == 0.0 || !size.is_finite() || (1e-5..1e16).contains(&size) {

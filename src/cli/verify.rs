@@ -1,0 +1,77 @@
+//! `bondspice verify MODEL.bg`: the circuit's run against the bond graph's own equations, and the balance of energy.
+
+use super::flags::ModelFlags;
+use super::output::write_text;
+use super::pipeline;
+use super::session::{Exit, Session};
+use super::watch::{self, Bar};
+use crate::bond::elaborate::Overrides;
+use crate::sim::FailureKind;
+use crate::source::FileId;
+use crate::verify::Report;
+use std::sync::Arc;
+
+/// What it does, in a line.
+pub const ABOUT: &str = "Prove the translation of a bond graph: 0 proved, 1 not";
+
+/// An example for the help.
+pub const EXAMPLE: &str = "The bond graph's own equations are integrated without any circuit and compared with the \
+netlist's transient; the energy balance must close.\n\nExample: bondspice verify model.bg --format json";
+
+/// Its flags.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The bond graph (.bg); - for standard input
+    file: String,
+    #[command(flatten)]
+    model: ModelFlags,
+    /// Form of the result
+    #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
+    format: String,
+    /// Where to write the result
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<String>,
+}
+
+/// Verifies.
+pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
+    match verify(&arguments, session) {
+        Ok(exit) | Err(exit) => exit,
+    }
+}
+
+fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    let overrides = arguments.model.overrides(session)?;
+    let file = session.load(&arguments.file)?;
+    let report = report(file, &overrides, session)?;
+    let text = match arguments.format.as_str() {
+        "json" => format!("{}\n", report.json()),
+        _ => report.text(),
+    };
+    write_text(arguments.output.as_deref(), &text, session)?;
+    Ok(match session.exit() {
+        Exit::Fine if !report.passes() => Exit::Negative,
+        exit => exit,
+    })
+}
+
+fn report(file: FileId, overrides: &Overrides, session: &mut Session) -> Result<Report, Exit> {
+    let mut d = vec![];
+    let bar = Bar::new(session.global.quiet);
+    let progress = bar.clone();
+    let report = pipeline::verify(&session.map, file, overrides, &mut d, |settings| {
+        settings.interrupt = Some(watch::stop_flag());
+        if let Some(bar) = progress {
+            settings.progress = Some(Arc::new(move |part| bar.show(part)));
+        }
+    });
+    if let Some(bar) = bar {
+        bar.clear();
+    }
+    session.say(d);
+    match report {
+        Ok(Some(report)) => Ok(report),
+        Err(FailureKind::Interrupted) => Err(Exit::Interrupted),
+        Ok(None) | Err(_) => Err(session.exit()),
+    }
+}
