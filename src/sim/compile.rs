@@ -2,6 +2,7 @@
 
 use super::explain;
 use super::laws::LawSet;
+use super::reduce;
 use super::system::{LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
@@ -30,6 +31,7 @@ pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
         builder.conductances.push((row, row, 1.0));
     }
     builder.place_laws();
+    builder.reduce();
     let system = builder.finish();
     match check(&system) {
         Ok(()) => Some(system),
@@ -57,6 +59,8 @@ struct Builder<'a> {
     charge_entries: Vec<(u32, u32, f64)>,
     rate_entries: Vec<(u32, u32, f64)>,
     curved: Vec<bool>,
+    /// Charges that others determine.
+    dependent: Vec<bool>,
     groups: Vec<(Dag, Vec<Placed>, Option<Junction>)>,
 }
 
@@ -71,6 +75,7 @@ impl<'a> Builder<'a> {
             charge_entries: vec![],
             rate_entries: vec![],
             curved: vec![false; stamps.charges.len()],
+            dependent: vec![false; stamps.charges.len()],
             groups: vec![],
         };
         let laws = stamps.laws.iter().map(|stamp| &stamp.law);
@@ -113,7 +118,7 @@ impl<'a> Builder<'a> {
                 Leaf::Time => n,
                 Leaf::Mode(m) => n + 1 + m,
                 Leaf::Rate(k) => match self.rate_unknowns.get(k) {
-                    Some(unknown) if !output => *unknown,
+                    Some(unknown) if !output || self.dependent[*k as usize] => *unknown,
                     _ => n + 1 + modes + k,
                 },
             }))
@@ -184,6 +189,79 @@ impl<'a> Builder<'a> {
         self.groups.retain(|(_, laws, _)| !laws.is_empty());
     }
 
+    /// Makes the rates of dependent charges unknowns of their own, until no constraint is left that can be used.
+    fn reduce(&mut self) {
+        let n = self.unknowns.len();
+        let mut slopes: Vec<(u32, u32)> = vec![];
+        let mut curved_charges = vec![];
+        for (dag, laws, _) in &self.groups {
+            for law in laws {
+                let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
+                match &law.target {
+                    Target::Equations(into) => {
+                        for input in inputs {
+                            slopes.extend(into.iter().map(|(row, _)| (*row, input)));
+                        }
+                    }
+                    Target::Charge(k) => curved_charges.extend(inputs.map(|input| (*k, input))),
+                }
+            }
+        }
+        let initial: Vec<Option<f64>> = self.stamps.charges.iter().map(|c| c.initial).collect();
+        // The search factorises a matrix; where that is dear, the run itself finds out.
+        const MOST: usize = 5000;
+        while self.dependent.contains(&false) && n + self.dependent.len() <= MOST {
+            // b of each equation, where no source moves it.
+            let mut constant = vec![Some(0.0); self.unknowns.len()];
+            for (row, value) in &self.constants {
+                constant[*row as usize] = constant[*row as usize].map(|b: f64| b + value);
+            }
+            for source in &self.stamps.sources {
+                let fixed = source.waveform.is_constant().then(|| source.waveform.value(0.0));
+                for (row, factor) in &source.into {
+                    let b = &mut constant[row.0 as usize];
+                    *b = b.zip(fixed).map(|(b, value)| b + factor * value);
+                }
+            }
+            let mut charges = self.charge_entries.clone();
+            charges.extend(curved_charges.iter().map(|(k, input)| (*k, *input, 1.5)));
+            let found = reduce::constraint(&reduce::Parts {
+                n: self.unknowns.len(),
+                conductances: &self.conductances,
+                slopes: &slopes,
+                charges: &charges,
+                rates: &self.rate_entries,
+                dependent: &self.dependent,
+                curved: &self.curved,
+                constant: &constant,
+                initial: &initial,
+            });
+            let Some(reduce::Constraint { charge: k, factors }) = found else { return };
+            self.dependent[k as usize] = true;
+            let known = self.rate_unknowns.get(&k).copied();
+            self.add_rate(k);
+            let Some(w) = self.rate_unknowns.get(&k).copied() else { return };
+            if known.is_some() {
+                self.conductances.retain(|(row, ..)| *row != w);
+                self.rate_entries.retain(|(_, row, _)| *row != w);
+            }
+            // The charge's rate is now w wherever it stood.
+            for (_, row, factor) in self.rate_entries.extract_if(.., |(charge, ..)| *charge == k) {
+                self.conductances.push((row, w, factor));
+            }
+            for (j, z) in factors {
+                // Of several dependent charges each rate is an unknown.
+                if self.dependent[j as usize] {
+                    if let Some(rate) = self.rate_unknowns.get(&j) {
+                        self.conductances.push((w, *rate, z));
+                    }
+                } else {
+                    self.rate_entries.push((j, w, z));
+                }
+            }
+        }
+    }
+
     fn finish(mut self) -> System {
         let stamps = self.stamps;
         let n = self.unknowns.len();
@@ -244,6 +322,7 @@ impl<'a> Builder<'a> {
             initial_charges: stamps.charges.iter().map(|charge| charge.initial).collect(),
             initial: stamps.initial.iter().map(|(node, value)| (node.0, *value)).collect(),
             curved: self.curved,
+            held: self.dependent.iter().map(|dependent| !dependent).collect(),
             groups,
             sources: stamps
                 .sources

@@ -63,6 +63,21 @@ pub(crate) fn flip(network: &mut Network, mode: usize) {
     network.forget_pivots();
 }
 
+/// Changes a mode, and all others whose controls have come to their thresholds in the same step (`before` → `now`).
+pub(crate) fn flip_all(network: &mut Network, mode: usize, before: &[f64], now: &[f64]) {
+    for other in 0..network.modes.len() {
+        let past = excess(network, other, now[other]);
+        let rising = past > excess(network, other, before[other]);
+        let range = (now[other] - before[other]).abs();
+        let room = slack(network, other, now[other]).max(4.0 * SLACK * range);
+        if other != mode && rising && past >= -room {
+            network.mode_room[other] = room;
+            flip(network, other);
+        }
+    }
+    flip(network, mode);
+}
+
 /// Solves, changes the modes that the solution contradicts, and solves again until none does; at most twice as often
 /// as there are modes.
 pub(crate) fn settle_modes(

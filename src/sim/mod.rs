@@ -12,6 +12,7 @@ mod network;
 mod newton;
 mod op;
 mod output;
+mod reduce;
 mod settings;
 mod statistics;
 mod step;

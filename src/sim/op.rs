@@ -85,10 +85,10 @@ pub(crate) fn consistent_values(
     floors: &[f64],
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
-    let held = vec![true; network.system.charges()];
+    let held = &network.system.held;
     let targets = state.q.clone();
     settle_modes(network, state, |network, state| {
-        find(network, &held, &targets, floors, state, false, scratch)
+        find(network, held, &targets, floors, state, false, scratch)
     })
 }
 
@@ -113,6 +113,9 @@ pub(crate) fn operating_point(
                     // the equations that contradict each other (its row is in a null vector of the transpose).
                     for row in singular.rows.iter().flatten().filter(|row| **row >= n) {
                         let k = (row - n) as usize;
+                        if !network.system.held[k] {
+                            continue;
+                        }
                         let open = |unknown: usize| {
                             singular.columns.iter().any(|set| set.contains(&(unknown as u32)))
                         };

@@ -34,7 +34,8 @@ pub(crate) struct Rows<'a> {
     /// Values on a line, while a step is looked at.
     probe: Vec<f64>,
     point: State,
-    all: Vec<bool>,
+    /// Charges that are states.
+    held: Vec<bool>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     factorised: Option<bool>,
 }
@@ -57,7 +58,7 @@ impl<'a> Rows<'a> {
             high: vec![f64::NEG_INFINITY; columns],
             probe: vec![0.0; columns],
             point: State::new(0.0, system.equations(), system.charges()),
-            all: vec![true; system.charges()],
+            held: system.held.clone(),
             factorised: None,
         }
     }
@@ -267,7 +268,7 @@ impl<'a> Rows<'a> {
         work: &mut Work,
     ) -> bool {
         let Work { x, w, q, scratch, .. } = work;
-        let held = &self.all;
+        let held = &self.held;
         let frozen = Frozen { t: time, held, targets, floors: weights, most: 1, prime: false };
         if self.factorised.is_none() {
             self.factorised = Some(network.factorise_frozen(held).is_ok());
@@ -306,6 +307,10 @@ impl<'a> Rows<'a> {
 
     fn send(&mut self, network: &mut Network) -> io::Result<()> {
         network.statistics.rows += 1;
+        for value in &mut self.row {
+            // −0 becomes 0.
+            *value += 0.0;
+        }
         self.sink.row(&self.row)
     }
 }

@@ -558,7 +558,9 @@ impl<'a> Run<'a> {
                 &network.statistics,
             ));
         }
-        events::flip(&mut self.network, mode);
+        // Other modes may stand on their thresholds at the same instant, on their way across.
+        let Run { network, controls, .. } = self;
+        events::flip_all(network, mode, &controls.right, &controls.left);
         self.restart(Moment::Restart)?;
         self.shorten();
         self.row_here()

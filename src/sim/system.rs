@@ -185,6 +185,8 @@ pub struct System {
     pub(crate) initial: Vec<(u32, f64)>,
     /// Whether a charge has a non-linear part.
     pub(crate) curved: Vec<bool>,
+    /// Whether a charge is a state; the others follow from these.
+    pub(crate) held: Vec<bool>,
     pub(crate) groups: Vec<LawGroup>,
     pub(crate) sources: Vec<Source>,
     pub(crate) modes: Vec<ModeData>,
@@ -312,7 +314,8 @@ impl fmt::Display for System {
             for (column, value) in self.charges.row(k) {
                 write!(f, " {value:+e}·{}", self.unknowns[column].name)?;
             }
-            writeln!(f, "{}", if self.curved[k] { " + law" } else { "" })?;
+            let law = if self.curved[k] { " + law" } else { "" };
+            writeln!(f, "{law}{}", if self.held[k] { "" } else { "   (follows from the others)" })?;
         }
         let mut law = 0;
         for group in &self.groups {

@@ -469,6 +469,69 @@ fn a_loop_of_capacitors_and_a_source_is_redistributed() {
 }
 
 #[test]
+fn storages_that_follow_from_others_are_no_states() {
+    // Two inductors in series, and two capacitors in parallel: one state each, and no loss of order.
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("R1", vec![1, 2], r(2.0)),
+        ("L1", vec![2, 3], l(0.3, 0.0)),
+        ("L2", vec![3, 4], l(0.1, 0.0)),
+        ("R2", vec![4, 5], r(1.0)),
+        ("C1", vec![5, 0], c(0.2, 0.0)),
+        ("C2", vec![5, 0], c(0.3, 0.0)),
+    ]);
+    let (trace, statistics) = run(&system, &grid(3.0, 0.1, 1e-9));
+    assert_eq!(statistics.method, "rodas5p", "{statistics}");
+    assert!(system.to_string().contains("follows from the others"));
+    // 0.4·i' + 3·i + q/0.5 = 1: roots of 0.4 s² + 3 s + 2.
+    let root = (9.0f64 - 3.2).sqrt();
+    let (a, b) = ((-3.0 + root) / 0.8, (-3.0 - root) / 0.8);
+    let current = |t: f64| ((a * t).exp() - (b * t).exp()) / (0.4 * (a - b));
+    let slope = |t: f64| (a * (a * t).exp() - b * (b * t).exp()) / (0.4 * (a - b));
+    assert!(worst(&trace, "i(l1)", current) < 1e-8, "{statistics}");
+    // The voltage across L2 is 0.1·i', and what stands beyond it R2·i + v(5).
+    let (v3, v4) = (column(&trace, "v(3)"), column(&trace, "v(4)"));
+    for (k, t) in trace.columns[0].iter().enumerate() {
+        assert!((v3[k] - v4[k] - 0.1 * slope(*t)).abs() < 1e-8, "at {t}");
+    }
+}
+
+#[test]
+fn two_switches_may_flip_at_one_instant() {
+    // One closes and the other opens where the same ramp crosses 0.5; the inductor's current never stops.
+    let ramp = Waveform::Pwl(vec![(0.0, 0.0), (1.0, 1.0)]);
+    let switch = |control, on: f64| DeviceKind::Switch {
+        control,
+        on,
+        off: on,
+        on_resistance: 1e-2,
+        off_resistance: 1e6,
+        initially_on: None,
+    };
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(1.0)),
+        ("V2", vec![2, 0], v(ramp)),
+        ("S1", vec![1, 3], switch(volt(2, 0), 0.5)),
+        ("S2", vec![3, 0], switch(volt(0, 2), -0.5)),
+        ("L1", vec![3, 4], l(0.1, 1.0)),
+        ("R1", vec![4, 0], r(1.0)),
+    ]);
+    let (trace, statistics) = run(&system, &grid(1.0, 0.01, 1e-7));
+    // Rates (R + Ron)/L, the open switch's leakage left out.
+    let rate = 1.01 / 0.1;
+    let at_half = (-rate * 0.5f64).exp();
+    let exact = |t: f64| {
+        if t <= 0.5 {
+            (-rate * t).exp()
+        } else {
+            let end = 1.0 / 1.01;
+            end + (at_half - end) * (-rate * (t - 0.5)).exp()
+        }
+    };
+    assert!(worst(&trace, "i(l1)", exact) < 1e-5, "{statistics}");
+}
+
+#[test]
 fn switches_flip_where_their_control_crosses() {
     // A relaxation oscillator: the switch discharges C above 2 V until 1 V.
     let switch = DeviceKind::Switch {
