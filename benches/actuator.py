@@ -62,7 +62,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         path = lambda name: os.path.join(scratch, name)
         for run, options in RUNS.items():
-            reference = read(f"tests/reference/eha_one_line_{run}.csv")
+            reference = read(f"tests/reference/eha/one_line_{run}.csv")
             jump = 0.1 if run == "step" else None
             arguments = [MODEL, *options, *OBSERVE]
             subprocess.run([BINARY, "convert", *arguments, "-o", path("as_emitted.cir"), "--map", path("map.json")], check=True)

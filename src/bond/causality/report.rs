@@ -270,12 +270,12 @@ pub fn to_text(graph: &BondGraph, causality: &Causality) -> String {
         let (from, to) = (end_name(graph, bond.from), end_name(graph, bond.to));
         let _ = writeln!(text, "  {from} {arrow}{to}");
     }
-    let _ = writeln!(text, "\nstates ({})", causality.states.len());
+    let integrators: Vec<&Signal> =
+        graph.signals.iter().filter(|s| matches!(s.law, SignalLaw::Integrator { .. })).collect();
+    let _ = writeln!(text, "\nstates ({})", causality.order);
     for &id in &causality.states {
         let _ = writeln!(text, "  {}", name(graph, id));
     }
-    let integrators: Vec<&Signal> =
-        graph.signals.iter().filter(|s| matches!(s.law, SignalLaw::Integrator { .. })).collect();
     for signal in &integrators {
         let _ = writeln!(text, "  signal {}", signal.name);
     }
