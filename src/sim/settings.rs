@@ -22,7 +22,7 @@ pub enum Interval {
 /// What absolute tolerances mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tolerance {
-    /// Per unknown: reltol times its magnitude in a pilot pass, at most its nominal value and at least a thousandth of
+    /// Per unknown: reltol times its magnitude in a pilot pass, at most its nominal value and at least a hundredth of
     /// that; without a nominal value vntol or abstol, but no more than 1e-3·reltol of the magnitude.
     Scaled,
     /// vntol for voltages and abstol for currents, as they stand.

@@ -140,7 +140,7 @@ impl<'a> Run<'a> {
             match (settings.tolerance, unknown.nominal, magnitudes.map(|m| m[k])) {
                 // A domain's nominal value is a guess: tanks know no pressures of megapascals.
                 (Tolerance::Scaled, Some(nominal), size) if nominal > 0.0 => {
-                    settings.reltol * size.unwrap_or(0.0).clamp(1e-3 * nominal, nominal)
+                    settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
                 }
                 (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
                     literal.min(1e-3 * settings.reltol * size)

@@ -1,0 +1,388 @@
+//! Every shipped model, run, against what is known of it independently: trajectories that were integrated from
+//! equations derived by hand, closed forms, printed digits.
+//!
+//! The error is that of `trace::compare`: the largest difference over the reference's rows as a part of the
+//! reference's range.
+
+use bondspice::bond::elaborate::Overrides;
+use bondspice::cli::pipeline::run_text;
+use bondspice::trace::{Trace, compare, csv};
+
+fn file(path: &str) -> String {
+    let path = format!("{}/{path}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn options(reltol: Option<&str>) -> Overrides {
+    let mut overrides = Overrides::default();
+    overrides.options.extend(reltol.map(|value| ("reltol".to_string(), value.to_string())));
+    overrides
+}
+
+/// Runs a model of `models/`.
+fn run(model: &str, overrides: &Overrides) -> Trace {
+    match run_text(&format!("{model}.bg"), &file(&format!("models/{model}.bg")), overrides) {
+        Ok((trace, _)) => trace,
+        Err(diagnostics) => panic!("{model}: {diagnostics:#?}"),
+    }
+}
+
+fn reference(path: &str) -> Trace {
+    csv::read(file(&format!("tests/reference/{path}.csv")).as_bytes())
+        .expect("the reference is a trace")
+}
+
+/// Compares a trace with a reference, and fails with all signals that differ by more than `tolerance`.
+fn agree(what: &str, trace: &Trace, reference: &Trace, tolerance: f64) {
+    let settings = compare::Settings { tolerance, ..compare::Settings::default() };
+    let comparison = compare::compare(trace, reference, &settings);
+    let mut report = String::new();
+    for signal in &comparison.signals {
+        let mark = if signal.same() { "    " } else { "<== " };
+        report += &format!("{mark}{} {:.2e} at {}\n", signal.name, signal.max, signal.at);
+    }
+    assert!(
+        comparison.signals.iter().all(|s| s.same()),
+        "{what}, tolerance {tolerance:e}:\n{report}"
+    );
+    println!("{what}, tolerance {tolerance:e}:\n{report}");
+}
+
+/// The reference without columns that the model's own list of observed variables does not have.
+fn common(trace: &Trace, mut reference: Trace, least: usize) -> Trace {
+    let keep: Vec<bool> = reference.names.iter().map(|name| trace.names.contains(name)).collect();
+    let mut kept = keep.iter();
+    reference.columns.retain(|_| *kept.next().unwrap());
+    let mut kept = keep.iter();
+    reference.units.retain(|_| *kept.next().unwrap());
+    let mut kept = keep.iter();
+    reference.names.retain(|_| *kept.next().unwrap());
+    assert!(reference.names.len() > least, "{:?} against {:?}", trace.names, reference.names);
+    reference
+}
+
+fn textbook(model: &str) {
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        let trace = run(model, &options(reltol));
+        let reference = common(&trace, reference(&format!("textbook/{model}")), 5);
+        agree(model, &trace, &reference, tolerance);
+    }
+}
+
+#[test]
+fn mass_spring_damper() {
+    textbook("msd");
+}
+
+#[test]
+fn dc_motor_with_load() {
+    textbook("dc_motor_load");
+}
+
+#[test]
+fn duffing_oscillator() {
+    textbook("duffing");
+}
+
+#[test]
+fn dependent_gear() {
+    textbook("gear_dep");
+}
+
+#[test]
+fn bridge_with_coil() {
+    textbook("rlc_bridge");
+}
+
+#[test]
+fn two_tanks() {
+    textbook("two_tank");
+}
+
+#[test]
+fn buck_converter() {
+    textbook("buck");
+}
+
+const ACTUATOR: &str = "x, theta, f(armature) as \"I\", f(shaft) as \"Omega\", e(pump_port) as \"dPp\", \
+    f(line) as \"Qp\", e(jack_port) as \"dPj\", f(rod) as \"Vj\", e(attachment) as \"Fj\", alpha, \
+    power(bus) as \"Pelec\"";
+
+fn actuator(reference_name: &str, change: impl Fn(&mut Overrides)) {
+    let reference = reference(&format!("eha/{reference_name}"));
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        let mut overrides = options(reltol);
+        overrides.observe = Some(ACTUATOR.to_string());
+        change(&mut overrides);
+        let trace = run("eha_one_line", &overrides);
+        agree(reference_name, &trace, &reference, tolerance);
+    }
+}
+
+#[test]
+fn actuator_nominal() {
+    actuator("one_line_nominal", |_| {});
+}
+
+#[test]
+fn actuator_step() {
+    actuator("one_line_step", |overrides| {
+        overrides.drive = vec![
+            "x_ref = step(0.1 s, 0 mm, 20 mm)".to_string(),
+            "M_FC = pwl(0 s, 0 N*m; 0.5 s, 0 N*m; 0.6 s, -6 kN*m; 1 s, -6 kN*m)".to_string(),
+        ];
+        overrides.until = Some("1 s".to_string());
+    });
+}
+
+/// A column by its header.
+fn column<'a>(trace: &'a Trace, name: &str) -> &'a [f64] {
+    let at = trace.names.iter().position(|n| n == name);
+    &trace.columns[at.unwrap_or_else(|| panic!("no `{name}` in {:?}", trace.names))]
+}
+
+/// Compares columns with functions of time over all rows.
+fn closed_form(
+    model: &str,
+    overrides: &Overrides,
+    tolerance: f64,
+    forms: &[(&str, &dyn Fn(f64) -> f64)],
+) {
+    let trace = run(model, overrides);
+    let mut exact = Trace::new(vec!["time".to_string()], vec!["s".to_string()]);
+    exact.columns[0] = trace.columns[0].clone();
+    assert!(exact.columns[0].len() > 1);
+    for (name, form) in forms {
+        exact.names.push(name.to_string());
+        exact.units.push(String::new());
+        exact.columns.push(trace.columns[0].iter().map(|t| form(*t)).collect());
+    }
+    let settings = compare::Settings { tolerance, ..compare::Settings::default() };
+    assert_eq!(
+        compare::compare(&trace, &exact, &settings).signals.len(),
+        forms.len(),
+        "{model}: {:?}",
+        trace.names
+    );
+    agree(model, &trace, &exact, tolerance);
+}
+
+#[test]
+fn series_circuit() {
+    // 10 V on 1 mH, 2 Ohm, 100 uF.
+    let (l, r, c, u) = (1e-3, 2.0, 1e-4, 10.0);
+    let a = r / (2.0 * l);
+    let w = (1.0_f64 / (l * c) - a * a).sqrt();
+    let current = |t: f64| u / (l * w) * (-a * t).exp() * (w * t).sin();
+    let charge = |t: f64| c * u * (1.0 - (-a * t).exp() * ((w * t).cos() + a / w * (w * t).sin()));
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        closed_form(
+            "rlc",
+            &options(reltol),
+            tolerance,
+            &[("f(mesh)", &current), ("q(C)", &charge)],
+        );
+    }
+}
+
+/// Values that other tools' tests and documentation print, or that follow from closed forms.
+/// Model, parameters set, and (time, column, digits).
+type Printed = (
+    &'static str,
+    &'static [(&'static str, &'static str)],
+    &'static [(f64, &'static str, &'static str)],
+);
+
+const PRINTED: &[Printed] = &[
+    (
+        "A1",
+        &[],
+        &[
+            (0.5, "q", "7.78800783"),
+            (1.0, "q", "6.06530660"),
+            (5.0, "q", "0.820849986"),
+            (10.0, "q", "0.0673794700"),
+        ],
+    ),
+    (
+        "A2",
+        &[],
+        &[
+            (0.5, "q", "9.45959469"),
+            (1.0, "q", "8.94839317"),
+            (5.0, "q", "5.73753421"),
+            (10.0, "q", "3.29192988"),
+        ],
+    ),
+    (
+        "A3",
+        &[],
+        &[
+            (0.5, "q", "0.140904120"),
+            (0.5, "p", "1.27293973"),
+            (5.0, "q", "0.101294275"),
+            (5.0, "p", "-0.162532987"),
+        ],
+    ),
+    ("A4", &[], &[(5.0, "q", "2.98652411")]),
+    ("A5", &[], &[(5.0, "q", "0.236257515")]),
+    (
+        "A6",
+        &[],
+        &[(1.0, "q", "0.367879441"), (2.0, "q", "0.270670566"), (5.0, "q", "0.0336897350")],
+    ),
+    (
+        "A7",
+        &[],
+        &[
+            (1.0, "Ca", "1"),
+            (1.0, "Cb", "1.41969860"),
+            (1.0, "L", "0.316060279"),
+            (5.0, "Ca", "1"),
+            (5.0, "Cb", "0.543796655"),
+            (5.0, "L", "0.469679239"),
+            (60.0, "Ca", "1"),
+            (60.0, "Cb", "0.5"),
+            (60.0, "L", "0.5"),
+        ],
+    ),
+    (
+        "A8",
+        &[],
+        &[
+            (10.0, "q", "8.37277877"),
+            (10.0, "p", "4.58195608"),
+            (100.0, "q", "-5.17395582"),
+            (100.0, "p", "18.0080119"),
+        ],
+    ),
+    (
+        "C1",
+        &[],
+        &[
+            (2e-3, "i", "6.28419224e-4"),
+            (2e-3, "e2", "0.352429597"),
+            (40e-3, "i", "4.25531915e-4"),
+            (40e-3, "e2", "0.4"),
+        ],
+    ),
+    (
+        "D1",
+        &[],
+        &[
+            (1.0, "y", "11.7779906"),
+            (1.0, "w", "19.4788873"),
+            (10.0, "y", "3.55952157"),
+            (10.0, "w", "63.7252804"),
+            (100.0, "y", "4.04760169"),
+            (100.0, "w", "39.9204997"),
+            (400.0, "y", "3.98406375"),
+            (400.0, "w", "39.8406375"),
+        ],
+    ),
+    ("D3", &[], &[(1e-3, "v", "0.283468689"), (3e-3, "v", "0.632120559")]),
+    ("E2", &[], &[(1.5, "q", "0.632120559"), (3.0, "q", "0.864664717")]),
+    ("E4", &[], &[(1.0, "i1", "2.5"), (1.0, "i3", "2.5"), (1.0, "i5", "0"), (1.0, "i", "5")]),
+    (
+        "E4",
+        &[("R4", "2")],
+        &[
+            (1.0, "vb", "2.69230769"),
+            (1.0, "vc", "3.07692308"),
+            (1.0, "i5", "-0.384615385"),
+            (1.0, "i", "4.23076923"),
+        ],
+    ),
+    (
+        "F1",
+        &[],
+        &[
+            (4.76802203, "q", "1"),
+            (4.76802203, "p", "0"),
+            (47.6802203, "q", "1"),
+            (47.6802203, "energy", "0.75"),
+        ],
+    ),
+    ("F2", &[], &[(1.0, "v", "0.517009824"), (1.0, "i", "4.82990176e-4")]),
+];
+
+/// Half a unit of the last digit printed.
+fn half_digit(digits: &str) -> f64 {
+    let (mantissa, exponent) = digits.split_once('e').unwrap_or((digits, "0"));
+    let decimals = mantissa.split_once('.').map_or(0, |(_, after)| after.len() as i32);
+    // Exact values are printed short.
+    let decimals = if decimals < 4 { 9 } else { decimals };
+    0.5 * 10f64.powi(exponent.parse::<i32>().unwrap() - decimals)
+}
+
+#[test]
+fn textbook_cases_to_the_printed_digits() {
+    let mut wrong = vec![];
+    for (model, set, values) in PRINTED {
+        let mut overrides = options(Some("1e-9"));
+        overrides.set =
+            set.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect();
+        let trace = run(&format!("textbook/{model}"), &overrides);
+        for (time, name, digits) in *values {
+            let row = trace.columns[0].iter().position(|t| (t - time).abs() <= 1e-9 * time);
+            let Some(row) = row else {
+                wrong.push(format!("{model}: no row at {time}"));
+                continue;
+            };
+            let value = column(&trace, name)[row];
+            let expected: f64 = digits.parse().unwrap();
+            let error = (value - expected).abs();
+            let values = column(&trace, name);
+            let high = values.iter().copied().fold(f64::MIN, f64::max);
+            let low = values.iter().copied().fold(f64::MAX, f64::min);
+            let scale = expected.abs().max(high - low);
+            if error.is_nan() || error > 1.01 * half_digit(digits) + 1e-6 * scale {
+                wrong.push(format!(
+                    "{model} {name}({time}) = {value}, not {digits} (by {error:.1e})"
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn textbook_cases_over_all_rows() {
+    let w = 3f64.sqrt() / 2.0;
+    let ring =
+        |t: f64, sign: f64| (-t / 2.0).exp() * ((w * t).cos() + sign * 3f64.sqrt() * (w * t).sin());
+    let check = |model: &str, forms: &[(&str, &dyn Fn(f64) -> f64)]| {
+        closed_form(&format!("textbook/{model}"), &options(None), 1e-4, forms);
+        closed_form(&format!("textbook/{model}"), &options(Some("1e-9")), 1e-6, forms);
+    };
+    check("A1", &[("q", &|t| 10.0 * (-t / 2.0).exp())]);
+    check("A2", &[("q", &|t| 10.0 * (-t / 9.0).exp())]);
+    check("A3", &[("q", &|t| ring(t, -1.0)), ("p", &|t| ring(t, 1.0))]);
+    check("A4", &[("q", &|t| 3.0 - 2.0 * (-t).exp())]);
+    check("A5", &[("q", &|t| ((2.0 * t).sin() - 2.0 * (2.0 * t).cos()) / 5.0 + 1.4 * (-t).exp())]);
+    check("A6", &[("q", &|t| t * (-t).exp())]);
+    check("D3", &[("v", &|t| 1.0 - (-t / 3e-3).exp())]);
+    check(
+        "E1",
+        &[
+            ("p", &|t| -10.0 * (-t / 2.0).exp() * (t / 2.0).sin()),
+            ("q", &|t| 10.0 * (-t / 2.0).exp() * (t / 2.0).cos()),
+        ],
+    );
+    check("E2", &[("q", &|t| 1.0 - (-t / 1.5).exp())]);
+}
+
+#[test]
+fn every_model_has_a_test() {
+    let tests = include_str!("models.rs");
+    let folder = format!("{}/models", env!("CARGO_MANIFEST_DIR"));
+    for folder in [folder.clone(), format!("{folder}/textbook")] {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|e| e == "bg") {
+                let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+                assert!(tests.contains(&format!("\"{stem}\"")), "{stem} is not tested");
+            }
+        }
+    }
+}
