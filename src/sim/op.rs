@@ -87,9 +87,14 @@ pub(crate) fn consistent_values(
 ) -> Result<(), Trouble> {
     let held = &network.system.held;
     let targets = state.q.clone();
-    settle_modes(network, state, |network, state| {
+    let result = settle_modes(network, state, |network, state| {
         find(network, held, &targets, floors, state, false, scratch)
-    })
+    });
+    if result.is_err() {
+        // What the search left behind is no charge that anybody stated.
+        state.q.copy_from_slice(&targets);
+    }
+    result
 }
 
 /// Finds the operating point at `state.t`; `state.q` holds initial charges for those storages that it leaves
