@@ -109,7 +109,7 @@ pub const PREFIXES: &[(&str, f64)] = &[
 ];
 
 /// Words that never are units.
-const NEVER: &[&str] = &["and", "or", "not", "then", "else", "step", "in", "as"];
+const NEVER: &[&str] = &["and", "or", "not", "then", "else", "step", "until", "in", "as"];
 
 /// Why a text is no unit, and where in it (bytes).
 #[derive(Clone, Debug, PartialEq)]

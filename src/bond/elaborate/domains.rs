@@ -12,6 +12,7 @@ impl Scope<'_> {
     pub fn infer_domains(&mut self) {
         let mut settled: Vec<BondId> = vec![];
         let mut asked = vec![false; self.graph.vertices.len()];
+        let mut crossed = vec![false; self.graph.vertices.len()];
         // Laws may speak of readings whose domains follow only later: ask the elements again until nothing new comes.
         loop {
             let before = settled.len();
@@ -24,8 +25,14 @@ impl Scope<'_> {
             while let Some(bond) = settled.get(next).copied() {
                 next += 1;
                 let Bond { from, to, .. } = *self.graph.bond(bond);
-                self.spread(bond, from, &mut settled);
-                self.spread(bond, to, &mut settled);
+                for end in [from, to] {
+                    // Over a junction once is enough: all its bonds are told at the first.
+                    let junction =
+                        self.declarations[end.vertex.index()].element.shape.is_junction();
+                    if !(junction && std::mem::replace(&mut crossed[end.vertex.index()], true)) {
+                        self.spread(bond, end, &mut settled);
+                    }
+                }
             }
             if settled.len() == before {
                 return;

@@ -55,9 +55,9 @@ const FORMS: &[Form] = &[
     form(Shape::Inertia, "f", false, &[MOMENTUM], |x| Made::Store(StoreLaw::OfStored(x))),
     form(Shape::Inertia, "p", false, &[FLOW], |x| Made::Store(StoreLaw::OfPower(x))),
     form(Shape::Inertia, "f", true, &[EFFORT, FLOW], Made::Rate),
-    form(Shape::Transformer, "r", false, &[], Made::Ratio),
+    form(Shape::Transformer, "r", false, &[], modulus),
     form(Shape::Transformer, "gain", false, &[], Made::Gain),
-    form(Shape::Gyrator, "r", false, &[], Made::Ratio),
+    form(Shape::Gyrator, "r", false, &[], modulus),
     form(Shape::Gyrator, "gain", false, &[], Made::Gain),
 ];
 

@@ -11,7 +11,7 @@ use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node};
 use crate::quantity::Domain;
 use crate::source::Span;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 impl Scope<'_> {
     /// The columns of a run: those of the command line, else the file's, else the default ones.
@@ -150,8 +150,9 @@ impl Scope<'_> {
     /// Inputs, outputs, signals, e of 0-junctions, f of 1-junctions, q and p of storages, each in file order.
     fn default_columns(&self) -> Vec<Observation> {
         let mut columns: Vec<Observation> = vec![];
+        let mut heads: HashSet<String> = HashSet::new();
         let mut add = |column: Observation| {
-            if columns.iter().all(|other| other.name != column.name) {
+            if heads.insert(column.name.clone()) {
                 columns.push(column);
             }
         };

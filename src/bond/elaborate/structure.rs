@@ -15,6 +15,8 @@ struct Joint {
     named: Option<u32>,
     /// Where the name stands.
     span: Span,
+    /// Where all of the end stands, kind and arguments included.
+    whole: Span,
 }
 
 /// What joins a vertex: the bond, whether at its head, and the joint.
@@ -27,12 +29,13 @@ impl Scope<'_> {
         let mut incomplete: Vec<VertexId> = vec![];
         let chains = std::mem::take(&mut self.chains);
         for chain in &chains {
-            let first: Vec<_> = chain.first.iter().map(|end| self.joint(end, d)).collect();
+            let first: Vec<_> =
+                chain.first.iter().map(|end| self.joint(end, &mut incomplete, d)).collect();
             let mut from = first.last().copied().flatten();
             for (arrow, ends) in &chain.links {
                 let mut last = None;
                 for end in ends {
-                    let to = self.joint(end, d);
+                    let to = self.joint(end, &mut incomplete, d);
                     match (from, to) {
                         (Some(from), Some(to)) => self.join(from, to, arrow, &mut joined, d),
                         // The other end has been reported: do not count this one's bonds.
@@ -54,11 +57,19 @@ impl Scope<'_> {
         self.check_sources(d);
     }
 
-    /// The end of an arrow; an error has been reported when there is none.
-    fn joint(&self, end: &ChainEnd, d: &mut Vec<Diagnostic>) -> Option<Joint> {
+    /// The end of an arrow; an error has been reported when there is none, and `incomplete` learns whose bond is missing.
+    fn joint(
+        &self,
+        end: &ChainEnd,
+        incomplete: &mut Vec<VertexId>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Joint> {
         let vertex = self.vertex(&end.path, d)?;
-        let named = self.port(vertex, &end.path, d)?;
-        Some(Joint { vertex, named, span: end.path.span })
+        let Some(named) = self.port(vertex, &end.path, d) else {
+            incomplete.push(vertex);
+            return None;
+        };
+        Some(Joint { vertex, named, span: end.path.span, whole: end.span })
     }
 
     /// The port that a path names: `Some(None)` when it names none, `None` when it names a wrong one.
@@ -98,7 +109,9 @@ impl Scope<'_> {
         joined: &mut [Vec<Joined>],
         d: &mut Vec<Diagnostic>,
     ) {
-        let span = from.span.join(to.span);
+        // Of several ends in a list each has its own place: only the first stands right behind the arrow.
+        let behind = self.map.text(Span { start: arrow.span.end, end: to.whole.start, ..to.whole });
+        let span = if behind.contains(',') { to.whole } else { from.whole.join(to.whole) };
         let id = BondId(self.graph.bonds.len() as u32);
         if from.vertex == to.vertex {
             d.push(

@@ -24,8 +24,11 @@ pub fn parse(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> File {
     let before = errors(d);
     let mut at = 0;
     while let Some(piece) = scan.piece(at, d) {
+        let known = d.len();
         let statement = if piece.bad { None } else { statement(&scan, text, &piece, d) };
-        at = if statement.is_some() { piece.next } else { piece.restart };
+        // A statement that the language will have is whole; one that cannot be read may hold the start of the next.
+        let whole = statement.is_some() || d[known..].iter().any(|d| d.code == "E0201");
+        at = if whole { piece.next } else { piece.restart };
         let kind = statement.unwrap_or(StatementKind::Unreadable);
         statements.push(Statement { kind, span: piece.span });
         if errors(d) - before >= MOST_ERRORS {
