@@ -10,9 +10,12 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .filter(|candidate| *candidate != name)
         .map(|candidate| (distance(&letters, candidate), candidate))
         .filter(|(distance, candidate)| {
-            // A name of one or two letters has everything near it: there only a slip of case counts.
+            // A letter has every other letter near it: there only a slip of case counts; of two letters the first
+            // must be right.
+            let longest = candidate.chars().count().max(letters.len());
+            let begins = candidate.chars().next() == letters.first().copied();
             *distance <= limit
-                && (*distance == 1 || candidate.chars().count().max(letters.len()) > 2)
+                && (*distance == 1 || longest > 2 || (longest == 2 && letters.len() == 2 && begins))
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -54,6 +57,8 @@ mod tests {
         assert_eq!(nearest("pumpport", names), Some("pump_port"));
         assert_eq!(nearest("l", names), Some("L"));
         assert_eq!(nearest("x", names), None);
+        assert_eq!(nearest("DM", ["DN", "QM"]), Some("DN"));
+        assert_eq!(nearest("y2", ["x2", "z"]), None);
         assert_eq!(nearest("zzzzzz", names), None);
         assert_eq!(nearest("rdo", names), Some("rod"));
     }

@@ -213,6 +213,18 @@ fn nearest_unit(name: &str) -> Option<String> {
         let same = |candidate: &str| candidate.to_lowercase() == name.to_lowercase();
         return all_names().find(|candidate| same(candidate));
     }
+    // One letter too many, `uFF`, or two units run together, `kNm`.
+    let cuts = || name.char_indices().map(|(at, _)| at).skip(1);
+    let last = cuts().last().filter(|at| is_unit_name(&name[..*at]));
+    let joined = cuts().find(|at| is_unit_name(&name[..*at]) && is_unit_name(&name[*at..]));
+    match (last, joined) {
+        (Some(last), _) if name[..last].ends_with(&name[last..]) => {
+            return Some(name[..last].to_string());
+        }
+        (_, Some(at)) => return Some(format!("{}*{}", &name[..at], &name[at..])),
+        (Some(last), None) => return Some(name[..last].to_string()),
+        (None, None) => {}
+    }
     let names: Vec<String> = all_names().collect();
     nearest(name, names.iter().map(String::as_str)).map(str::to_string)
 }
@@ -558,6 +570,8 @@ mod tests {
             ("HZ", Some("Hz")),
             ("pa", Some("Pa")),
             ("m3", Some("m^3")),
+            ("kNm", Some("kN*m")),
+            ("mHy", Some("mH")),
             ("bananas", None),
         ] {
             let Err(UnitError::Unknown { nearest, .. }) = Unit::parse(text) else {

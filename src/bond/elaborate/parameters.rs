@@ -26,13 +26,13 @@ impl Scope<'_> {
         self.evaluated = vec![false; count];
         self.parameter_dimensions = vec![Dim::Unknown; count];
         let mut lowered = vec![false; count];
-        for k in 0..count {
+        for (k, lowered) in lowered.iter_mut().enumerate() {
             let value = self.parameters[k].value;
             let place = Place::constant("a parameter");
             if let Some(expr) = self.lower(value, place, d) {
                 self.graph.parameters[k].unit = unit_of(value);
                 self.graph.parameters[k].expr = expr;
-                lowered[k] = true;
+                *lowered = true;
             }
         }
         let overridden = self.override_parameters(set, &mut lowered, d);

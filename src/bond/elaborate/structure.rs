@@ -48,10 +48,9 @@ impl Scope<'_> {
         }
         self.chains = chains;
         // A statement that could not be read may hold the bonds that seem to be missing.
-        let holes = !self.excused.is_empty();
         for id in self.graph.vertex_ids().collect::<Vec<_>>() {
-            let whole = !incomplete.contains(&id)
-                && !(holes && self.excused.contains(self.graph.vertex(id).name.as_str()));
+            let excused = self.excused.contains(self.graph.vertex(id).name.as_str());
+            let whole = !incomplete.contains(&id) && !excused;
             self.give_ports(id, &joined[id.index()], whole, d);
         }
         self.check_sources(d);
