@@ -51,6 +51,7 @@ pub enum Leaf {
     /// Inside a law: the element's own variable.
     Own(Variable),
     /// A bond's variable, counted along the half arrow, or negated.
+    #[allow(missing_docs)]
     Bond { bond: BondId, variable: Power, negated: bool },
     /// q of a compliance or p of an inertia.
     Stored(VertexId),
@@ -133,6 +134,7 @@ pub enum SignalLaw {
     /// A value at each instant.
     Algebraic(Expr),
     /// dy/dt = rate, y(0) = initial.
+    #[allow(missing_docs)]
     Integrator { rate: Expr, initial: Initial },
     /// A function of time alone with corners that the solver lands on.
     Waveform(Waveform),
@@ -152,13 +154,17 @@ pub enum Initial {
 #[derive(Clone, Debug)]
 pub enum Waveform {
     /// `before` until `at`, then `after`.
+    #[allow(missing_docs)]
     Step { at: Expr, before: Expr, after: Expr },
     /// 0 until `at`, then `slope`·(t − at).
+    #[allow(missing_docs)]
     Ramp { at: Expr, slope: Expr },
     /// As SPICE's PULSE; a rise or fall of 0 is an exact jump.
+    #[allow(missing_docs)]
     Pulse { low: Expr, high: Expr, delay: Expr, rise: Expr, fall: Expr, width: Expr, period: Expr },
     /// As SPICE's SIN: `offset` + amplitude·exp(−(t−delay)·damping)·sin(2π·frequency·(t−delay) + phase) from `delay`
     /// on, before it the value at `delay`; phase in radians.
+    #[allow(missing_docs)]
     Sine { offset: Expr, amplitude: Expr, frequency: Expr, delay: Expr, damping: Expr, phase: Expr },
     /// Straight lines between points, holding the end values; two equal times make a jump.
     Pwl(Vec<(Expr, Expr)>),
@@ -187,12 +193,15 @@ pub enum Law {
     /// Common flow.
     One,
     /// Sets its bond's effort or flow. Detectors are sources of 0 (`De` sets flow 0, `Df` effort 0).
+    #[allow(missing_docs)]
     Source { sets: Power, value: Expr, detector: bool },
     /// e and f at the same instant.
     Dissipator(Dissipation),
     /// Integrates one power variable into a stored one, whose law gives the other.
+    #[allow(missing_docs)]
     Store { kind: Storage, law: StoreLaw, initial: StoreInitial },
     /// Rate form: der(e) = rate (compliance) or der(f) = rate (inertia), over its own f (or e) and anything else.
+    #[allow(missing_docs)]
     Rate { kind: Storage, rate: Expr, initial: Initial },
     /// Ratio r: e1 = r·e2, f2 = r·f1. Gain g: e2 = g·e1, f1 = g·f2.
     Transformer(Modulus),
