@@ -231,6 +231,11 @@ fn portable(expr: &GraphExpr) -> bool {
         Node::Leaf(_) => true,
         Node::Unary(Unary::Negate, a) => portable(a),
         Node::Unary(Unary::Not, _) | Node::If(..) | Node::Table(..) => false,
+        // Small whole powers are written as products.
+        Node::Binary(Binary::Power, a, b) => {
+            b.as_number().is_some_and(|b| b.fract() == 0.0 && (1.0..=8.0).contains(&b))
+                && portable(a)
+        }
         Node::Binary(op, a, b) => {
             matches!(op, Binary::Add | Binary::Subtract | Binary::Multiply | Binary::Divide)
                 && portable(a)

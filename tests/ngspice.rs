@@ -1,0 +1,172 @@
+//! Emitted netlists, unedited, in stock ngspice against reference trajectories, and against the second route where
+//! there are none.
+
+mod translated;
+
+use bondspice::bond::elaborate::Overrides;
+use bondspice::expr::Expr;
+use bondspice::netlist::Leaf;
+use bondspice::second;
+use bondspice::trace::{Trace, compare, formats};
+use std::path::Path;
+use std::process::Command;
+use translated::{Translated, models, root, translated};
+
+/// Whether ngspice is there; where it must be and is not, the test fails.
+fn ngspice() -> bool {
+    let found = Command::new("ngspice").arg("--version").output().is_ok();
+    if !found {
+        let required = std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_some_and(|v| v == "1");
+        assert!(!required, "ngspice is missing");
+        eprintln!("skipped: ngspice is missing");
+    }
+    found
+}
+
+/// The observed columns as ngspice computes them, by the map.
+fn run(model: &Translated) -> Trace {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("deck.cir");
+    let raw = folder.path().join("deck.raw");
+    std::fs::write(&deck, model.text()).unwrap();
+    let output = Command::new("ngspice").arg("-b").arg("-r").arg(&raw).arg(&deck).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).to_string()
+        + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{said}\n{}", model.graph.name, model.text());
+    let bytes = std::fs::read(&raw).unwrap_or_else(|_| panic!("{}\n{said}", model.graph.name));
+    let result = formats::read("deck.raw", &bytes).unwrap();
+    let names = &model.translation.netlist.names;
+    let map = &model.translation.map;
+    let ground = names.find("0").unwrap();
+    let observed: Vec<_> = map.variables.iter().filter(|variable| variable.observed).collect();
+    let mut trace = Trace::new(
+        std::iter::once("time".to_string()).chain(observed.iter().map(|v| v.bg.clone())).collect(),
+        vec![],
+    );
+    trace.columns[0] = result.time().to_vec();
+    let column = |name: String| {
+        let name = name.to_lowercase();
+        result.column(&name).unwrap_or_else(|| panic!("{}: no {name}", model.graph.name))
+    };
+    for (at, variable) in observed.iter().enumerate() {
+        let expr: Expr<(Vec<f64>, f64)> = variable.expr.as_ref().unwrap().map(&mut |leaf, _| {
+            let zero = || vec![0.0; result.rows()];
+            let voltage = |node| match node == ground {
+                true => zero(),
+                false => column(format!("v({})", names.text(node))).to_vec(),
+            };
+            let values = match leaf {
+                Leaf::Voltage(plus, None) => voltage(*plus),
+                Leaf::Voltage(plus, Some(minus)) => {
+                    voltage(*plus).iter().zip(voltage(*minus)).map(|(a, b)| a - b).collect()
+                }
+                Leaf::Current(device) => column(format!("i({})", names.text(*device))).to_vec(),
+                Leaf::Time => result.time().to_vec(),
+                Leaf::Parameter(name) => {
+                    let value = map.parameters.iter().find(|(known, _)| known == name).unwrap().1;
+                    vec![value; result.rows()]
+                }
+            };
+            Expr::leaf((values, 0.0))
+        });
+        trace.columns[at + 1] = (0..result.rows())
+            .map(|row| expr.evaluate(&mut |(values, _)| values[row]) * variable.factor)
+            .collect();
+    }
+    trace
+}
+
+/// Compares named columns and says every error.
+fn check(
+    model: &str,
+    trace: &Trace,
+    reference: &Trace,
+    pairs: &[(&str, &str)],
+    rise: f64,
+    tolerance: f64,
+) {
+    let signals = pairs.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+    let settings = compare::Settings { tolerance, rise: Some(rise), signals: Some(signals) };
+    let comparison = compare::compare(trace, reference, &settings);
+    assert!(comparison.missing.is_empty(), "{model}: {:?}", comparison.missing);
+    assert_eq!(comparison.signals.len(), pairs.len(), "{model}");
+    let errors: Vec<String> = comparison
+        .signals
+        .iter()
+        .map(|signal| format!("{} {:.1e} at {}", signal.name, signal.max, signal.at))
+        .collect();
+    println!("{model}: {}", errors.join(", "));
+    let worst = comparison.signals.iter().map(|signal| signal.max).fold(0.0, f64::max);
+    assert!(worst <= tolerance, "{model}: {}", errors.join(", "));
+}
+
+fn reference(name: &str) -> Trace {
+    let bytes = std::fs::read(root().join("tests/reference").join(name)).unwrap();
+    formats::read(name, &bytes).unwrap()
+}
+
+/// Reference columns and what the model calls them; all in SI.
+const ACTUATOR: &str = "x, theta, f(armature) as \"I\", f(shaft) as \"Omega\", e(pump_port) as \"dPp\", \
+                        f(line) as \"Qp\", alpha, power(bus) as \"Pelec\"";
+const COLUMNS: [&str; 8] = ["x", "theta", "I", "Omega", "dPp", "Qp", "alpha", "Pelec"];
+
+#[test]
+fn the_actuator_on_its_nominal_movement() {
+    if ngspice() {
+        let overrides = Overrides { observe: Some(ACTUATOR.into()), ..Overrides::default() };
+        let model = translated(Path::new("eha_one_line.bg"), &overrides);
+        let pairs = COLUMNS.map(|name| (name, name));
+        let reference = reference("eha/one_line_nominal.csv");
+        check("nominal", &run(&model), &reference, &pairs, 1e-6, 2e-4);
+    }
+}
+
+#[test]
+fn the_actuator_on_a_step() {
+    if ngspice() {
+        let overrides = Overrides {
+            observe: Some(ACTUATOR.into()),
+            drive: vec![
+                "x_ref = step(0.1 s, 0 mm, 20 mm)".into(),
+                "M_FC = pwl(0 s, 0 N*m; 0.5 s, 0 N*m; 0.6 s, -6 kN*m)".into(),
+            ],
+            until: Some("1 s".into()),
+            ..Overrides::default()
+        };
+        let model = translated(Path::new("eha_one_line.bg"), &overrides);
+        let pairs = COLUMNS.map(|name| (name, name));
+        let reference = reference("eha/one_line_step.csv");
+        check("step", &run(&model), &reference, &pairs, 1e-6, 1e-3);
+    }
+}
+
+#[test]
+fn every_model_gives_what_its_own_equations_give() {
+    if !ngspice() {
+        return;
+    }
+    for path in models() {
+        let model = translated(&path, &Overrides::default());
+        let experiment = &model.graph.experiment;
+        let (Some(until), Some(step)) = (experiment.until, experiment.step) else { continue };
+        let trace = run(&model);
+        // A quarter second of the actuator tells as much of its translation as all of it.
+        let rows = (until / step).round() as usize;
+        let rows = if path.starts_with("eha_one_line.bg") { 250 } else { rows };
+        let times: Vec<f64> = (0..=rows).map(|row| row as f64 * step).collect();
+        let mut d = vec![];
+        let settings = second::Settings { tolerance: 1e-6, ..second::Settings::default() };
+        let route = second::integrate(&model.graph, &model.causality, &times, &settings, &mut d);
+        let route = route.unwrap_or_else(|| panic!("{}: {d:#?}", path.display()));
+        let mut reference = Trace::new(route.names.clone(), vec![]);
+        reference.columns = route.columns;
+        // What stays at rounding of 0 has no range to compare with.
+        let pairs: Vec<(&str, &str)> = route.names[1..]
+            .iter()
+            .zip(&reference.columns[1..])
+            .filter(|(_, column)| column.iter().any(|value| value.abs() > 1e-9))
+            .map(|(name, _)| (name.as_str(), name.as_str()))
+            .collect();
+        check(&path.display().to_string(), &trace, &reference, &pairs, step * 1e-3, 2e-3);
+    }
+}
