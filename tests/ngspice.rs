@@ -146,27 +146,40 @@ fn every_model_gives_what_its_own_equations_give() {
         return;
     }
     for path in models() {
-        let model = translated(&path, &Overrides::default());
+        let mut model = translated(&path, &Overrides::default());
         let experiment = &model.graph.experiment;
-        let (Some(until), Some(step)) = (experiment.until, experiment.step) else { continue };
+        let Some(until) = experiment.until else { continue };
+        // The rows of textbook cases are few: ngspice's steps, a tenth of their interval, would be too long for it.
+        if path.starts_with("textbook") {
+            let step = Some(format!("{}", until / 1000.0));
+            model = translated(&path, &Overrides { step, ..Overrides::default() });
+        }
+        let Some(step) = model.graph.experiment.step else { continue };
         let trace = run(&model);
         // A quarter second of the actuator tells as much of its translation as all of it.
         let rows = (until / step).round() as usize;
         let rows = if path.starts_with("eha_one_line.bg") { 250 } else { rows };
-        let times: Vec<f64> = (0..=rows).map(|row| row as f64 * step).collect();
+        // ngspice writes its first row after its first step.
+        let times: Vec<f64> = (1..=rows).map(|row| row as f64 * step).collect();
         let mut d = vec![];
         let settings = second::Settings { tolerance: 1e-6, ..second::Settings::default() };
         let route = second::integrate(&model.graph, &model.causality, &times, &settings, &mut d);
         let route = route.unwrap_or_else(|| panic!("{}: {d:#?}", path.display()));
         let mut reference = Trace::new(route.names.clone(), vec![]);
         reference.columns = route.columns;
-        // What stays at rounding of 0 has no range to compare with.
+        // What stays constant has no range to compare with.
+        let varies = |column: &[f64]| {
+            let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), value| {
+                (low.min(*value), high.max(*value))
+            });
+            high - low > 1e-6 * high.abs().max(low.abs())
+        };
         let pairs: Vec<(&str, &str)> = route.names[1..]
             .iter()
             .zip(&reference.columns[1..])
-            .filter(|(_, column)| column.iter().any(|value| value.abs() > 1e-9))
+            .filter(|(_, column)| varies(column))
             .map(|(name, _)| (name.as_str(), name.as_str()))
             .collect();
-        check(&path.display().to_string(), &trace, &reference, &pairs, step * 1e-3, 2e-3);
+        check(&path.display().to_string(), &trace, &reference, &pairs, step * 1e-3, 5e-4);
     }
 }

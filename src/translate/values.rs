@@ -127,9 +127,9 @@ impl Builder<'_> {
     /// The effort of a bond.
     pub fn effort(&self, bond: BondId) -> Option<Expr> {
         let [from, to] = self.drawing.ends[bond.index()];
-        // At an element, so that a 0 V source stays outside.
-        let inner = super::islands::is_junction(self.graph, self.graph.bond(bond).to.vertex);
-        let pair = if inner { from } else { to };
+        // The node that bears the junction's name, where a 0 V source makes two of it.
+        let zero = |vertex| matches!(self.graph.vertex(vertex).law, graph::Law::Zero);
+        let pair = if zero(self.graph.bond(bond).to.vertex) { to } else { from };
         Some(self.voltage(self.nodes(pair?)))
     }
 
