@@ -9,7 +9,8 @@ use bondspice::source::SourceMap;
 use bondspice::translate::{Translation, translate};
 use std::path::{Path, PathBuf};
 
-/// A model on its way to the circuit.
+/// A model on its way to the circuit. Each test uses its part of it.
+#[allow(dead_code)]
 pub struct Translated {
     pub graph: BondGraph,
     pub causality: Causality,
