@@ -177,7 +177,7 @@ pub const CODES: &[Code] = &[
     row("E0925", "two columns of one name", "Columns are told apart by their names. Give one of them another name with `as`."),
     row("E0926", "time falls", "The first column of a trace must not decrease, and must hold numbers."),
     row("E0930", "not a map of variables", "`bondspice convert --map` writes the map: JSON with `variables`, each with `bg`, `expr`, `factor` and `unit`."),
-    row("E0932", "map does not fit the result", "None of the map's circuit variables has a column in the result. Is it the map of the netlist that was run?"),
+    row("E0932", "map does not fit the result", "None of the map's circuit variables has a column in the result. The map must be that of the netlist that was run."),
     row("E0933", "not a list of times", "A list of times has one time in seconds a line, rising from 0 on."),
     row("E0940", "wrong use of a flag", "The message says which flag and what it takes; `--help` shows an example."),
     row("E0941", "unknown format", "The format of a result follows from --format, else from the ending of -o: csv, raw, json."),
