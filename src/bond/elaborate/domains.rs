@@ -5,7 +5,7 @@ use super::scope::{Meaning, Scope};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
 use crate::bond::syntax::Value;
-use crate::quantity::{Dimension, Domain};
+use crate::quantity::{DOMAINS, Dimension, Domain, DomainRow};
 
 impl Scope<'_> {
     /// Finds the domain of every bond that something tells; the first that is told stays.
@@ -14,10 +14,12 @@ impl Scope<'_> {
         let mut asked = vec![false; self.graph.vertices.len()];
         let mut crossed = vec![false; self.graph.vertices.len()];
         // Laws may speak of readings whose domains follow only later: ask the elements again until nothing new comes.
+        // Only then what two domains share is taken for the likelier one: kelvins are pseudo-thermal beside watts.
+        let mut guess = false;
         loop {
             let before = settled.len();
             for id in self.graph.vertex_ids().collect::<Vec<_>>() {
-                if !asked[id.index()] && self.ask(id, &mut settled) {
+                if !asked[id.index()] && self.ask(id, guess, &mut settled) {
                     asked[id.index()] = true;
                 }
             }
@@ -34,7 +36,7 @@ impl Scope<'_> {
                     }
                 }
             }
-            if settled.len() == before {
+            if settled.len() == before && std::mem::replace(&mut guess, true) {
                 return;
             }
         }
@@ -49,7 +51,7 @@ impl Scope<'_> {
     }
 
     /// Asks a one-port for the domain of its bond. Whether it needs no asking again.
-    fn ask(&mut self, id: VertexId, settled: &mut Vec<BondId>) -> bool {
+    fn ask(&mut self, id: VertexId, guess: bool, settled: &mut Vec<BondId>) -> bool {
         let Some(&bond) = self.graph.vertex(id).bonds.first() else { return true };
         if self.declarations[id.index()].element.shape.is_junction()
             || self.graph.bond(bond).domain != Domain::Any
@@ -60,8 +62,11 @@ impl Scope<'_> {
             if dimension.is_none() {
                 continue;
             }
-            let found = Domain::find(|row| clue.dimension(row.domain) == Some(dimension));
-            if let Some(domain) = found {
+            let fits = |row: &&DomainRow| clue.dimension(row.domain) == Some(dimension);
+            let mut found = DOMAINS[1..].iter().filter(fits).map(|row| row.domain);
+            if let (Some(domain), other) = (found.next(), found.next())
+                && (guess || other.is_none())
+            {
                 self.settle(bond, domain, settled);
                 return true;
             }

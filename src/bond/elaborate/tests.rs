@@ -548,6 +548,11 @@ fn domains_without_units_are_open() {
     assert_eq!(rack.bonds[1].domain, Domain::Rotation);
     let heat = self::graph("Sf:h(1 W) -> 0:T -> C:m(3 J/K), R:wall(1 K/W)");
     assert!(heat.bonds.iter().all(|bond| bond.domain == Domain::PseudoThermal));
+    // What two domains share waits for what one has alone.
+    let wall = self::graph("Se:hot(300 K) -> 1:m -> R:wall(1 K/W)\nobserve f(wall) in W");
+    assert!(wall.bonds.iter().all(|bond| bond.domain == Domain::PseudoThermal));
+    let entropy = self::graph("Se:hot(300 K) -> 1:m -> R:wall(1)");
+    assert!(entropy.bonds.iter().all(|bond| bond.domain == Domain::Thermal));
 }
 
 #[test]
