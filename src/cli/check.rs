@@ -3,7 +3,9 @@
 use super::flags::ModelFlags;
 use super::pipeline::{self, Language};
 use super::session::{Exit, Session};
+use crate::circuit::stamps;
 use crate::diagnostic::Severity;
+use crate::sim;
 
 /// What it does, in a line.
 pub const ABOUT: &str = "Check a model or a netlist: syntax, names, units, domains, causality";
@@ -41,7 +43,11 @@ fn check(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
             }
         }
         Language::Netlist => {
-            pipeline::circuit(&session.map, file, &overrides, &mut d);
+            let circuit = pipeline::circuit(&session.map, file, &overrides, &mut d);
+            let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d));
+            if let Some(stamps) = stamps {
+                sim::compile(&stamps, &mut d);
+            }
         }
     }
     session.say(d);

@@ -238,9 +238,10 @@ impl Output {
             }
             Kind::Table(trace) => {
                 let text = summary(&trace).to_text();
+                let written = io::stdout().lock().write_all(text.as_bytes());
                 session
                     .remark("hint: -o out.csv keeps every row; --list names what can be observed");
-                io::stdout().lock().write_all(text.as_bytes()).map(|()| None)
+                written.map(|()| None)
             }
         };
         match written {

@@ -88,15 +88,27 @@ pub fn model(
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Model> {
-    let graph = graph(map, file, overrides, d)?;
+    let mut graph = graph(map, file, overrides, d)?;
     let causality = causality(&graph, d)?;
     elaborate::require_drives(&graph, d);
+    set_step(&mut graph, d);
     if has_errors(d) {
         return None;
     }
     let initial = initial::solve(&graph, &causality, d)?;
     let translation = translate::translate(&graph, &causality, &initial, map, d)?;
     Some(Model { graph, causality, initial, translation })
+}
+
+/// A thousand rows where only the end of the run is said.
+fn set_step(graph: &mut BondGraph, d: &mut Vec<Diagnostic>) {
+    if let (Some(until), None) = (graph.experiment.until, graph.experiment.step) {
+        graph.experiment.step = Some(until / 1000.0);
+        let message =
+            format!("no output interval is said: {:e} s, a thousandth of the run", until / 1000.0);
+        let note = Diagnostic::note("N0947", Span::NONE, message);
+        d.push(note.help("say it with --step, or in the file: `simulate until … step …`"));
+    }
 }
 
 impl Model {
@@ -197,6 +209,12 @@ pub fn prepare(
 ) -> Option<Run> {
     let native = language(map, file) == Language::Bond;
     let (circuit, units) = circuit(map, file, overrides, d)?;
+    if native && circuit.analyses.is_empty() {
+        let message = "nothing says until when to simulate";
+        let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
+        d.push(Diagnostic::error("E0806", Span::NONE, message).help(help));
+        return None;
+    }
     ready(circuit, &units, native, pick, d)
 }
 

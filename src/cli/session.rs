@@ -187,6 +187,8 @@ impl Session {
 /// The exit code that an error of this code asks for.
 pub fn exit_of(code: &str) -> Exit {
     match (code.get(1..3), code.get(3..5)) {
+        // Nothing to run, or an option that makes no sense: said before anything runs.
+        (Some("08"), Some("06" | "07")) => Exit::Input,
         (Some("08"), _) => Exit::Simulation,
         (Some("09"), Some(number)) if number < "20" => Exit::File,
         (Some("09"), Some(number)) if number >= "40" => Exit::Usage,
@@ -234,6 +236,7 @@ mod tests {
             ("E0101", Exit::Input),
             ("E0703", Exit::Input),
             ("E0801", Exit::Simulation),
+            ("E0806", Exit::Input),
             ("E0901", Exit::File),
             ("E0920", Exit::Input),
             ("E0940", Exit::Usage),

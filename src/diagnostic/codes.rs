@@ -187,6 +187,7 @@ pub const CODES: &[Code] = &[
     row("E0945", "two columns of one name", "The headers of a result must differ. Give one of the columns another name with `as`."),
     row("W0931", "result lacks variables of the map", "Some variables of the map need circuit variables that the simulator did not keep; they are left out. `.save all` keeps everything."),
     row("N0946", "one of several analyses is run", "A netlist asks for several analyses and the last is run. Pick another with --analysis."),
+    row("N0947", "output interval chosen", "The file says how long to simulate and not how often to write a row: a thousand rows are written."),
 ];
 
 /// The row of a code.
