@@ -8,9 +8,15 @@
 use super::report::{EnergyReport, Report, Trajectory};
 use crate::bond::causality::Causality;
 use crate::bond::graph::BondGraph;
+use crate::bond::initial::InitialState;
+use crate::circuit::stamps::stamp;
 use crate::diagnostic::Diagnostic;
+use crate::netlist::{Netlist, flatten};
 use crate::second::{self, Run};
+use crate::sim;
+use crate::source::SourceMap;
 use crate::trace::Trace;
+use crate::translate::translate;
 
 /// What is demanded.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +38,51 @@ impl Default for Settings {
             energy: 1e-6,
             reltol: 1e-8,
             second: second::Settings::default(),
+        }
+    }
+}
+
+/// Translates the graph, runs both routes and judges them.
+pub fn verify(
+    graph: &BondGraph,
+    causality: &Causality,
+    initial: &InitialState,
+    source: &SourceMap,
+    settings: &Settings,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Report> {
+    let translation = translate(graph, causality, initial, source, d)?;
+    verify_netlist(graph, causality, &translation.netlist, settings, d)
+}
+
+/// Runs the graph's own equations and a netlist that is meant to stand for it, and judges them. A netlist that cannot
+/// be run is an error, not a verdict.
+pub fn verify_netlist(
+    graph: &BondGraph,
+    causality: &Causality,
+    netlist: &Netlist,
+    settings: &Settings,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Report> {
+    let circuit = circuit_route(netlist, settings.reltol, d)?;
+    judge(graph, causality, &circuit, settings, d)
+}
+
+/// The transient of a netlist at the given reltol, on the grid that its header asks for.
+pub fn circuit_route(netlist: &Netlist, reltol: f64, d: &mut Vec<Diagnostic>) -> Option<Trace> {
+    let circuit = flatten::flatten(netlist, d)?;
+    let stamps = stamp(&circuit, d)?;
+    let system = sim::compile(&stamps, d)?;
+    let mut settings = sim::Settings::of(&circuit, true, d)?;
+    settings.reltol = reltol;
+    let names = std::iter::once("time".to_string());
+    let names = names.chain(stamps.outputs.iter().map(|output| output.0.clone())).collect();
+    let mut trace = Trace::new(names, vec![]);
+    match sim::transient(&system, &settings, &mut trace) {
+        Ok(_) => Some(trace),
+        Err(failure) => {
+            d.push(*failure.diagnostic);
+            None
         }
     }
 }
