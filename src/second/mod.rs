@@ -12,7 +12,8 @@ use crate::bond::consistent;
 use crate::bond::equations::compiled::Readings;
 use crate::bond::equations::{Formula, Input, Unknown};
 use crate::bond::graph::BondGraph;
-use crate::bond::initial::{self, Prepared};
+use crate::bond::initial;
+use crate::bond::prepared::{self, Prepared};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Node, Unary};
 use energy::{Energy, Meter};
@@ -63,7 +64,7 @@ pub fn integrate(
     let mut said = |found: Vec<Diagnostic>| {
         d.extend(found.into_iter().filter(|f| f.severity == crate::diagnostic::Severity::Error));
     };
-    let Some(mut prepared) = initial::prepare(graph, causality, &mut unheard) else {
+    let Some(mut prepared) = prepared::prepare(graph, causality, &mut unheard) else {
         said(unheard);
         return None;
     };
@@ -325,9 +326,14 @@ impl Sizes {
 fn explain(graph: &BondGraph, prepared: &Prepared, failure: &Failure) -> Diagnostic {
     let Prepared { equations, compiled, .. } = prepared;
     match failure {
-        Failure::Restart { t, trouble } => {
-            initial::explain(graph, equations, compiled, trouble, "E0851", &format!("at t = {t} s"))
-        }
+        Failure::Restart { t, trouble } => prepared::explain(
+            graph,
+            equations,
+            compiled,
+            trouble,
+            "E0851",
+            &format!("at t = {t} s"),
+        ),
         Failure::Stop(Stop::TooManySteps { t }) => Diagnostic::error(
             "E0852",
             crate::source::Span::NONE,

@@ -261,3 +261,70 @@ fn steps_are_landed_on_and_rows_there_hold_the_later_value() {
     near(run.columns[1][2], 2.0, 1e-9);
     near(run.columns[1][3], 2.0 * (-1.0f64).exp(), 1e-8);
 }
+
+#[test]
+fn conditions_on_time_alone_are_corners() {
+    // 1 C' = −e + u with u = 2 while mod(t, 1) < 0.4, R = C = 1.
+    let mut b = Build::default();
+    let time = Expr::leaf(Leaf::Time);
+    let within = Expr::call(Function::Mod, vec![time, n(1.0)]).binary(Binary::Less, n(0.4));
+    let source = b.vertex("Se", "U", effort_source(Expr::choice(within, n(2.0), n(0.0))));
+    let one = b.one("a");
+    let r = b.vertex("R", "R", resistor(1.0));
+    let c = b.vertex("C", "C", compliance(1.0, StoreInitial::Unstated));
+    b.bond(source, one);
+    b.fan(one, &[r, c]);
+    b.observe_stored(c);
+    let run = run(&b.graph, &[0.0, 0.4, 1.0, 1.4, 2.0]);
+    let mut q = 0.0;
+    for (row, (u, dt)) in [(2.0, 0.4), (0.0, 0.6), (2.0, 0.4), (0.0, 0.6f64)].iter().enumerate() {
+        q = u + (q - u) * (-dt).exp();
+        near(run.columns[1][row + 1], q, 1e-8);
+    }
+    assert_eq!(run.corners.len(), 5);
+}
+
+#[test]
+fn the_rate_form_exchanges_energy_with_what_modulates_it() {
+    // der(e) = 4·f through R = 1 from e0 = 1: e = exp(−4t), and ∫ e·f dt = (e² − 1)/8.
+    let mut b = Build::default();
+    let law = Law::Rate {
+        kind: Storage::Compliance,
+        rate: times(n(4.0), f()),
+        initial: Initial::Given(n(1.0)),
+    };
+    let c = b.vertex("C", "chamber", law);
+    let r = b.vertex("R", "R", resistor(1.0));
+    let bond = b.bond(c, r);
+    b.observe_bond("e", bond, Power::Effort);
+    b.observe_stored(c);
+    let run = run(&b.graph, &[0.0, 0.25, 1.0]);
+    for (t, (e, q)) in run.columns[0].iter().zip(run.columns[1].iter().zip(&run.columns[2])) {
+        near(*e, (-4.0 * t).exp(), 1e-8);
+        near(*q, ((-4.0 * t).exp() - 1.0) / 4.0, 1e-8);
+    }
+    near(run.energy.modulated, ((-8.0f64).exp() - 1.0) / 8.0, 1e-9);
+    near(run.energy.dissipated, -run.energy.modulated, 1e-9);
+}
+
+#[test]
+fn a_source_that_jumps_across_a_storage_moves_it_at_once() {
+    let mut b = Build::default();
+    let step = b.signal(
+        "u",
+        SignalLaw::Waveform(Waveform::Step { at: n(0.3), before: n(1.0), after: n(2.0) }),
+    );
+    let source = b.vertex("Se", "U", effort_source(Expr::leaf(Leaf::Signal(step))));
+    let zero = b.zero("a");
+    let c = b.vertex("C", "C", compliance(3.0, StoreInitial::Unstated));
+    let r = b.vertex("R", "R", resistor(4.0));
+    let supply = b.bond(source, zero);
+    b.fan(zero, &[c, r]);
+    b.observe_stored(c);
+    b.observe_bond("i", supply, Power::Flow);
+    let run = run(&b.graph, &[0.0, 0.2, 0.3, 0.5]);
+    for (row, u) in [1.0, 1.0, 2.0, 2.0].iter().enumerate() {
+        near(run.columns[1][row], 3.0 * u, 1e-8);
+        near(run.columns[2][row], u / 4.0, 1e-6);
+    }
+}

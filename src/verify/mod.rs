@@ -7,4 +7,4 @@ pub mod report;
 pub mod routes;
 
 pub use report::{EnergyReport, Report, Trajectory};
-pub use routes::{Settings, circuit_route, judge, verify, verify_netlist};
+pub use routes::{Settings, circuit_route, judge, verify_netlist};

@@ -8,15 +8,12 @@
 use super::report::{EnergyReport, Report, Trajectory};
 use crate::bond::causality::Causality;
 use crate::bond::graph::BondGraph;
-use crate::bond::initial::InitialState;
 use crate::circuit::stamps::stamp;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::{Netlist, flatten};
 use crate::second::{self, Run};
 use crate::sim;
-use crate::source::SourceMap;
 use crate::trace::Trace;
-use crate::translate::translate;
 
 /// What is demanded.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,19 +37,6 @@ impl Default for Settings {
             second: second::Settings::default(),
         }
     }
-}
-
-/// Translates the graph, runs both routes and judges them.
-pub fn verify(
-    graph: &BondGraph,
-    causality: &Causality,
-    initial: &InitialState,
-    source: &SourceMap,
-    settings: &Settings,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Report> {
-    let translation = translate(graph, causality, initial, source, d)?;
-    verify_netlist(graph, causality, &translation.netlist, settings, d)
 }
 
 /// Runs the graph's own equations and a netlist that is meant to stand for it, and judges them. A netlist that cannot

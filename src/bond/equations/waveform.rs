@@ -6,6 +6,9 @@
 
 use std::f64::consts::TAU;
 
+/// Periods of a pulse train whose corners are listed; a run with more would not end anyway.
+const MOST_TURNS: u32 = 10_000_000;
+
 /// A function of time with numbers for arguments.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -80,9 +83,8 @@ impl Wave {
             Wave::Sine { delay, .. } => push(*delay),
             Wave::Pwl(points) => points.iter().for_each(|(at, _)| push(*at)),
             Wave::Pulse { delay, rise, fall, width, period, .. } => {
-                let mut turn = 0.0;
-                loop {
-                    let begin = delay + turn * period;
+                for turn in 0..MOST_TURNS {
+                    let begin = delay + f64::from(turn) * period;
                     if begin >= until {
                         break;
                     }
@@ -95,7 +97,6 @@ impl Wave {
                     if *period <= 0.0 {
                         break;
                     }
-                    turn += 1.0;
                 }
             }
         }
