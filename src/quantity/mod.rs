@@ -1,6 +1,7 @@
 //! Units with rational exponents, and the domains of bond graphs.
 
 mod dimension;
+mod symbols;
 mod unit;
 mod domain;
 mod nearest;
@@ -8,4 +9,5 @@ mod nearest;
 pub use dimension::Dimension;
 pub use domain::{DOMAINS, Domain, DomainRow};
 pub use nearest::nearest;
-pub use unit::{PREFIXES, SYMBOLS, Unit, UnitError, is_unit_name, scan_unit};
+pub use symbols::{PREFIXES, SYMBOLS, Symbol, is_unit_name};
+pub use unit::{Unit, UnitError, scan_unit};
