@@ -32,7 +32,7 @@ fn kind<'c>(circuit: &'c Circuit, name: &str) -> &'c DeviceKind {
     &circuit
         .devices
         .iter()
-        .find(|device| device.name == name)
+        .find(|device| device.name.eq_ignore_ascii_case(name))
         .unwrap_or_else(|| panic!("{name}"))
         .kind
 }
@@ -230,7 +230,7 @@ fn errors_have_codes_and_helps() {
         ("b1 out 0 v=v(otu)\nr1 out 0 1", "E0740", Some("did you mean `out`?")),
         ("e1 out 0 nowhere 0 1\nr1 out 0 1", "E0740", None),
         ("f1 a 0 vv1 1\nv_1 a 0 1", "E0741", Some("did you mean `v_1`?")),
-        ("d1 a 0 DM\nr1 a 0 1\n.model DN D(is=1)", "E0742", Some("did you mean `DN`?")),
+        ("d1 a 0 DMOD\nr1 a 0 1\n.model DMOF D(is=1)", "E0742", Some("did you mean `DMOF`?")),
         ("d1 a 0 DM\nr1 a 0 1\n.model DM SW(vt=1)", "E0742", None),
         ("d1 a 0 DM\nr1 a 0 1\n.model DM D(iss=1)", "E0743", Some("did you mean `is`?")),
         ("v1 a 0 PWL(0 0 2 1 1 1)\nr1 a 0 1", "E0744", None),
