@@ -210,3 +210,6 @@ pub fn plain(value: f64) -> String {
         None => text,
     }
 }
+
+#[cfg(test)]
+mod round_trip;

@@ -99,7 +99,8 @@ fn definitions<'n>(
                 }
             }
             CardKind::Subcircuit(subcircuit) => {
-                if scope.subcircuits.insert(subcircuit.name, subcircuit).is_some() {
+                let before = scope.subcircuits.insert(subcircuit.name, subcircuit);
+                if before.is_some() {
                     d.push(twice(
                         "subcircuits",
                         names.text(subcircuit.name),
@@ -136,15 +137,12 @@ impl<'n> Expander<'n> {
                 | CardKind::OperatingPoint
                     if id != TOP =>
                 {
-                    if self.chain.last().is_some() {
-                        let error = Diagnostic::error(
-                            "E0736",
-                            card.span,
-                            "this card belongs outside `.subckt`",
-                        );
-                        if d.len() < 1000 && !d.contains(&error) {
-                            d.push(error);
-                        }
+                    let message = "this card belongs outside `.subckt`";
+                    let error = Diagnostic::error("E0736", card.span, message);
+                    // Once for each card, however many instances there are.
+                    let said = d.len() >= 1000 || d.contains(&error);
+                    if !said {
+                        d.push(error);
                     }
                 }
                 _ => {}

@@ -36,6 +36,9 @@ pub type Table<V> = HashMap<Name, V, BuildHasherDefault<NameHasher>>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScopeId(pub u32);
 
+/// A model: its card, its type, its parameters.
+pub type Model<'n> = (&'n Card, &'n str, &'n [(String, Expr)]);
+
 /// A scope.
 #[derive(Default)]
 pub struct Scope<'n> {
@@ -49,8 +52,8 @@ pub struct Scope<'n> {
     pub nodes: Table<NodeId>,
     /// Devices; of a K with several pairs the first.
     pub devices: Table<DeviceId>,
-    /// Models: their type and parameters, with their card.
-    pub models: Table<(&'n Card, &'n str, &'n [(String, Expr)])>,
+    /// Models.
+    pub models: Table<Model<'n>>,
     /// Definitions.
     pub subcircuits: Table<&'n Subcircuit>,
 }

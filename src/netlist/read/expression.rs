@@ -146,8 +146,12 @@ impl Language for Spice<'_> {
         let table = points.and_then(|points| table(&points));
         match (x, table) {
             (Some(x), Some(table)) => {
-                // Beyond its ends ngspice's pwl() goes on with its last slopes.
-                let table = if folded == "pwl" { extrapolated(table) } else { table };
+                let (x, table) = match (folded == "pwl").then(|| unclamped(&x, &table)) {
+                    Some(Some(inner)) => (inner, table),
+                    // Beyond its ends ngspice's pwl() goes on with its last slopes.
+                    Some(None) => (x, extrapolated(table)),
+                    None => (x, table),
+                };
                 Some(Expr::new(Node::Table(x, Arc::new(table)), span))
             }
             _ => {
@@ -169,6 +173,19 @@ pub fn table(points: &[f64]) -> Option<Table> {
     }
     let column = |k: usize| points.chunks(2).map(|pair| pair[k]).collect();
     Some(Table { x: column(0), y: column(1) })
+}
+
+/// x, where the argument is `min(max(x, first), last)`: a table that holds its ends, as a netlist for ngspice has to
+/// write it.
+fn unclamped(argument: &Expr, table: &Table) -> Option<Expr> {
+    let limited = |expr: &Expr, function, limit: Option<&f64>| match &*expr.node {
+        Node::Call(called, arguments) if *called == function && arguments.len() == 2 => {
+            (arguments[1].as_number().as_ref() == limit).then(|| arguments[0].clone())
+        }
+        _ => None,
+    };
+    let above = limited(argument, expr::Function::Min, table.x.last())?;
+    limited(&above, expr::Function::Max, table.x.first())
 }
 
 /// The table with its end slopes going on, by a point very far out on either side.
@@ -238,6 +255,11 @@ mod tests {
             assert!((value(text, 2.0) - expected).abs() < 1e-12, "{text} = {}", value(text, 2.0));
         }
         assert_eq!(value("pwl(x, 0,0, 1,10)", -1.0), -10.0);
+        assert_eq!(value("pwl(min(max(x,0),1), 0,0, 1,10)", 2.0), 10.0);
+        let (expr, _, _) = read("pwl(min(max(2*x,-1),1), -1,0, 1,10)");
+        assert!(
+            matches!(&*expr.unwrap().node, Node::Table(x, _) if matches!(*x.node, Node::Binary(..)))
+        );
     }
 
     #[test]
