@@ -99,6 +99,10 @@ fn start_modes(network: &mut Network) {
 /// The part of the tolerance that each step gets where the circuit is of index 2.
 const INDEX_2_PART: f64 = 0.05;
 
+/// Where the first step after a corner would have to be less than this part of the way to the next one, what happens
+/// in it counts as a jump.
+const LAYER: f64 = 1e-9;
+
 struct Run<'a> {
     network: Network<'a>,
     settings: &'a Settings,
@@ -121,6 +125,9 @@ struct Run<'a> {
     smallest: f64,
     /// Error and size of the last accepted step.
     last: Option<(f64, f64)>,
+    /// Whether no step has been accepted since the last restart, and whether its fast layer has been passed over.
+    fresh: bool,
+    smoothed: bool,
     /// Events since a moment, to see when they pile up.
     crowd: (f64, u32),
 }
@@ -164,6 +171,8 @@ impl<'a> Run<'a> {
             h: settings.stop,
             smallest: 8.0 * f64::EPSILON * settings.stop,
             last: None,
+            fresh: true,
+            smoothed: false,
             crowd: (0.0, 0),
             network,
             settings,
@@ -229,6 +238,8 @@ impl<'a> Run<'a> {
         self.work.before = None;
         self.work.linearised = false;
         self.last = None;
+        self.fresh = true;
+        self.smoothed = false;
         let network = &mut self.network;
         let (floors, scratch) = (&self.floors, &mut self.work.scratch);
         match op::consistent_values(network, &mut self.state, floors, scratch) {
@@ -407,6 +418,15 @@ impl<'a> Run<'a> {
             failed = true;
             bounded = false;
             search = Search::default();
+            if self.fresh && !self.smoothed && h < LAYER * remaining {
+                // A layer this thin (a junction's capacitance behind its series resistance) is beyond resolving.
+                self.smoothed = true;
+                self.redistribute(Moment::Restart)?;
+                self.weigh();
+                self.work.linearised = false;
+                h = 1e-6 * remaining;
+                continue;
+            }
             if h < self.smallest {
                 let network = &self.network;
                 let trouble = Trouble::Cut(cut);
@@ -444,6 +464,7 @@ impl<'a> Run<'a> {
         power: f64,
     ) -> Result<(), Failure> {
         self.network.statistics.accepted += 1;
+        self.fresh = false;
         let most = match self.method {
             Method::Gear2 => 2.0,
             _ => 6.0,
