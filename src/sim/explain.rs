@@ -217,7 +217,7 @@ fn loop_of_sources(system: &System, branches: &[DeviceId]) -> Diagnostic {
         diagnostic = diagnostic.label(system.device_span(*device), text);
     }
     diagnostic
-        .because("any current could flow round the loop; inductors count as sources of 0 V at rest")
+        .because("any current could flow round the loop")
         .help("put a resistance into the loop, or take one of the sources out")
 }
 
