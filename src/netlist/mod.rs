@@ -5,6 +5,7 @@ pub mod header;
 pub mod read;
 pub mod write;
 pub mod flatten;
+pub mod dialects;
 
 use crate::expr;
 use crate::source::Span;
