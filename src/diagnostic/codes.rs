@@ -112,7 +112,6 @@ pub const CODES: &[Code] = &[
     // -- 06: translation
     row("E0601", "needed flow is undetermined", "A law, a linked source or a column needs the flow of a bond in a ring of equal junctions, and the junctions leave what runs round the ring undetermined. Leave out one bond of the ring."),
     row("E0602", "quantity is in no circuit variable", "The quantity is left undetermined by the junctions, or is no variable of its element, so that no node or current of the circuit holds it. Observe another variable."),
-    row("W0601", "ring of equal junctions", "0-junctions joined in a ring leave the flow round it undetermined, 1-junctions the effort. It is taken as 0. Leave out one bond of the ring: the junctions are one junction without it."),
     // -- 07: netlists and circuits
     row("E0701", "not a card", "A line of a netlist begins with the letter of a device, a dot, an asterisk or a plus sign; of the cards with a dot, the known ones are named in the manual."),
     row("E0702", "not read yet", "The card or form belongs to SPICE, but this program does not read it yet. It is an error and not a warning, since leaving it out would make another circuit."),

@@ -98,7 +98,6 @@ impl Drawing {
 
     /// Takes the undetermined flow round a ring of 0-junctions, or effort round a ring of 1-junctions, as 0.
     fn cut_ring(&mut self, graph: &BondGraph, bond: BondId) {
-        self.rings.push(bond);
         if matches!(graph.vertex(graph.bond(bond).from.vertex).law, Law::One) {
             for pair in self.ends[bond.index()].into_iter().flatten() {
                 self.points.join(pair.plus, pair.minus);

@@ -168,26 +168,9 @@ impl Builder<'_> {
         (0..count).map(|point| names[self.drawing.points.root(point)]).collect()
     }
 
-    /// Says what the junctions leave undetermined.
+    /// Says which flow is needed and left undetermined by a ring of junctions. Rings themselves have been said by
+    /// causality.
     fn check(&self, diagnostics: &mut Vec<Diagnostic>) {
-        for bond in &self.drawing.rings {
-            let zero = matches!(
-                self.graph.vertex(self.graph.bond(*bond).from.vertex).law,
-                crate::bond::graph::Law::Zero
-            );
-            let (variable, kind) = if zero { ("flow", "0") } else { ("effort", "1") };
-            diagnostics.push(
-                Diagnostic::warning(
-                    "W0601",
-                    self.graph.bond(*bond).span,
-                    format!(
-                        "the {variable} round this ring of {kind}-junctions is undetermined and taken as 0"
-                    ),
-                )
-                .says(format!("{} closes the ring", self.graph.bond_name(*bond)))
-                .help("leave out one bond of the ring: the junctions are one junction without it"),
-            );
-        }
         for item in self.drawing.items.iter().flatten() {
             if let series_parallel::Item::Sense { bond, plus, minus } = item
                 && self.drawing.points.root(*plus) == self.drawing.points.root(*minus)

@@ -52,8 +52,6 @@ pub struct Drawing {
     pub ends: Vec<[Option<Pair>; 2]>,
     /// By island: what stands in it.
     pub items: Vec<Vec<Item>>,
-    /// Bonds round a ring of equal junctions, which leaves a variable undetermined.
-    pub rings: Vec<BondId>,
 }
 
 /// Where the common flow of a 1-junction enters and leaves the part of the loop that is still to be drawn.
@@ -70,7 +68,6 @@ impl Drawing {
             wishes: vec![None],
             ends: vec![[None; 2]; graph.bonds.len()],
             items: vec![Vec::new(); islands.len()],
-            rings: Vec::new(),
         };
         let mut sensed = vec![false; graph.bonds.len()];
         senses.iter().for_each(|sense| sensed[sense.bond.index()] = true);
