@@ -55,7 +55,7 @@ fn files() -> Vec<(Vec<String>, String, String)> {
         let name = inside.to_string_lossy().into_owned();
         let mut module: Vec<String> =
             inside.iter().map(|part| part.to_string_lossy().replace(".rs", "")).collect();
-        if module.iter().any(|part| part == "tests") {
+        if module.iter().any(|part| part == "tests") || is_test_module(&path) {
             continue;
         }
         if module.last().is_some_and(|last| ["mod", "lib", "main"].contains(&last.as_str())) {
@@ -65,6 +65,18 @@ fn files() -> Vec<(Vec<String>, String, String)> {
     }
     assert!(files.len() > 50, "only {} sources were found", files.len());
     files
+}
+
+/// Whether the module that a file belongs to is declared for tests alone.
+fn is_test_module(path: &Path) -> bool {
+    let name = path.file_stem().unwrap().to_string_lossy();
+    let parent = path.parent().unwrap().join("mod.rs");
+    let Ok(text) = std::fs::read_to_string(parent) else { return false };
+    let lines: Vec<&str> = text.lines().collect();
+    lines.windows(2).any(|pair| {
+        let declared = pair[1].trim_start_matches("pub(crate) ").strip_prefix("mod ");
+        pair[0] == "#[cfg(test)]" && declared == Some(&format!("{name};"))
+    })
 }
 
 /// The text without comments and without what stands after the first `#[cfg(test)]` before a `mod … {`.
