@@ -99,6 +99,9 @@ fn start_modes(network: &mut Network) {
 /// The part of the tolerance that each step gets where the circuit is of index 2.
 const INDEX_2_PART: f64 = 0.05;
 
+/// A pilot pass ends after so many steps: what magnitudes it has seen until then will do.
+const PILOT_STEPS: u64 = 1000;
+
 /// Where the first step after a corner would have to be less than this part of the way to the next one, what happens
 /// in it counts as a jump.
 const LAYER: f64 = 1e-9;
@@ -182,6 +185,9 @@ impl<'a> Run<'a> {
     fn run(&mut self) -> Result<(), Failure> {
         self.start()?;
         while self.state.t < self.settings.stop - self.smallest {
+            if self.rows.is_none() && self.network.statistics.accepted >= PILOT_STEPS {
+                return Ok(());
+            }
             self.check_interrupt()?;
             let (corner, event) = self.advance()?;
             if let Some(mode) = event {
