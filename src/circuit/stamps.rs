@@ -40,7 +40,7 @@ pub type Law = expr::Expr<Leaf>;
 /// What a law may speak of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leaf {
-    /// `x[k]`.
+    /// ``x[k]``.
     Unknown(UnknownId),
     /// dQ_k/dt, the current of a capacitor or the voltage of an inductor.
     Rate(u32),

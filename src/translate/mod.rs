@@ -3,11 +3,11 @@
 //! Effort becomes voltage, flow current. A bond's end at an element is a port of two terminals, + and −: the voltage
 //! between them is the bond's effort, the current into + the flow into the element. The steps, a file each:
 //!
-//! 1. [`forms`]: which devices stand for each element;
-//! 2. [`islands`]: what hangs together when only TF and GY separate;
-//! 3. [`flows`]: where each flow can be read, and 0 V sources where one is needed and nothing carries it;
-//! 4. [`series_parallel`], [`couplers`]: the nodes between which everything stands;
-//! 5. [`elements`], [`signals`], [`experiment`]: the cards;
+//! 1. `forms`: which devices stand for each element;
+//! 2. `islands`: what hangs together when only TF and GY separate;
+//! 3. `flows`: where each flow can be read, and 0 V sources where one is needed and nothing carries it;
+//! 4. `series_parallel`, `couplers`: the nodes between which everything stands;
+//! 5. `elements`, `signals`, `experiment`: the cards;
 //! 6. [`map`]: every effort, flow, state and signal in terms of the circuit.
 
 mod names;

@@ -299,7 +299,10 @@ impl<'a> Scope<'a> {
             format!("no element or junction is called `{name}`"),
         )
         .says("not declared anywhere");
-        let names = self.graph.vertices.iter().map(|vertex| vertex.name.as_str());
+        let declared = self.graph.vertices.iter().map(|vertex| vertex.name.as_str());
+        // Names in statements that could not be read may be meant too; sorted, so that a tie has one winner.
+        let unread: std::collections::BTreeSet<&str> = self.excused.iter().copied().collect();
+        let names = declared.chain(unread);
         d.push(if let Some(meant) = nearest(name, names) {
             did_you_mean(error, path.name.span, meant)
         } else if self.values.contains_key(name) {
