@@ -1,6 +1,6 @@
 //! `bondspice causality MODEL.bg`: strokes, order, states, what depends on what, algebraic loops, conflicts.
 
-use super::flags::ModelFlags;
+use super::flags::ReportFlags;
 use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session};
@@ -15,19 +15,7 @@ pub const EXAMPLE: &str = "A stroke stands at the end that receives the effort: 
 effort on b.\n\nExample: bondspice causality model.bg --format json";
 
 /// Its flags.
-#[derive(clap::Args)]
-pub struct Arguments {
-    /// The bond graph (.bg); - for standard input
-    file: String,
-    #[command(flatten)]
-    model: ModelFlags,
-    /// Form of the result
-    #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
-    format: String,
-    /// Where to write the result
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<String>,
-}
+pub type Arguments = ReportFlags;
 
 /// Assigns causality and shows it, conflicts included.
 pub fn run(arguments: Arguments, session: &mut Session) -> Exit {

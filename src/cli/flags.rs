@@ -28,6 +28,22 @@ pub struct ModelFlags {
     pub step: Option<String>,
 }
 
+/// Flags of a command that reads a model and writes a result as text or JSON.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReportFlags {
+    /// The bond graph (.bg); - for standard input
+    pub file: String,
+    #[command(flatten)]
+    /// What to change in it.
+    pub model: ModelFlags,
+    /// Form of the result
+    #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
+    pub format: String,
+    /// Where to write the result
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<String>,
+}
+
 impl ModelFlags {
     /// The flags in the words of elaboration.
     ///

@@ -65,7 +65,9 @@ pub const COMMANDS: &[Command] = &[
 pub fn describe() -> clap::Command {
     let program = Global::augment_args(clap::Command::new("bondspice"))
         .version(env!("CARGO_PKG_VERSION"))
-        .about("Turns bond graphs into circuits, simulates them and proves the translation")
+        .about(
+            "Turns bond graphs into circuits, simulates them, checks the result by a second route",
+        )
         .after_help("Example: bondspice simulate models/eha_one_line.bg -o run.csv")
         .subcommand_required(true)
         .arg_required_else_help(true)

@@ -1,6 +1,6 @@
 //! `bondspice verify MODEL.bg`: the circuit's run against the bond graph's own equations, and the balance of energy.
 
-use super::flags::ModelFlags;
+use super::flags::ReportFlags;
 use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session};
@@ -12,26 +12,14 @@ use crate::verify::Report;
 use std::sync::Arc;
 
 /// What it does, in a line.
-pub const ABOUT: &str = "Prove the translation of a bond graph: 0 proved, 1 not";
+pub const ABOUT: &str = "Check a translation by a second route without a circuit: 0 right, 1 not";
 
 /// An example for the help.
 pub const EXAMPLE: &str = "The bond graph's own equations are integrated without any circuit and compared with the \
 netlist's transient; the energy balance must close.\n\nExample: bondspice verify model.bg --format json";
 
 /// Its flags.
-#[derive(clap::Args)]
-pub struct Arguments {
-    /// The bond graph (.bg); - for standard input
-    file: String,
-    #[command(flatten)]
-    model: ModelFlags,
-    /// Form of the result
-    #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
-    format: String,
-    /// Where to write the result
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<String>,
-}
+pub type Arguments = ReportFlags;
 
 /// Verifies.
 pub fn run(arguments: Arguments, session: &mut Session) -> Exit {

@@ -104,7 +104,9 @@ impl Builder<'_> {
             OPTIONS.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect(),
         ));
         if !saved.is_empty() {
-            push(CardKind::Save { print: false, items: saved });
+            // `.print` makes a run without a raw file worth having (`… | ngspice -b`), `.save` keeps a raw file small.
+            push(CardKind::Save { print: false, items: saved.clone() });
+            push(CardKind::Save { print: true, items: saved });
         }
         if let (Some(until), Some(step)) = (experiment.until, experiment.step) {
             let number = |value: f64| Expr::number(value);

@@ -230,6 +230,11 @@ fn errors_have_codes_and_helps() {
         ("b1 out 0 v=v(otu)\nr1 out 0 1", "E0740", Some("did you mean `out`?")),
         ("e1 out 0 nowhere 0 1\nr1 out 0 1", "E0740", None),
         ("f1 a 0 vv1 1\nv_1 a 0 1", "E0741", Some("did you mean `v_1`?")),
+        (
+            "l1 a 0 1\nl2 a 0 1\nk1 l1 l2 0.5\nb1 a 0 i=i(k1)",
+            "E0741",
+            Some("read the current of one of the inductors"),
+        ),
         ("d1 a 0 DMOD\nr1 a 0 1\n.model DMOF D(is=1)", "E0742", Some("did you mean `DMOF`?")),
         ("d1 a 0 DM\nr1 a 0 1\n.model DM SW(vt=1)", "E0742", None),
         ("d1 a 0 DM\nr1 a 0 1\n.model DM D(iss=1)", "E0743", Some("did you mean `is`?")),

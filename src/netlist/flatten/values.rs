@@ -5,7 +5,7 @@ use super::scope::{self, ScopeId};
 use crate::circuit::{self, DeviceId, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
-use crate::netlist::{Expr, Leaf, Name, Names};
+use crate::netlist::{Element, Expr, Leaf, Name, Names};
 use crate::quantity::nearest;
 use crate::source::Span;
 use std::collections::HashMap;
@@ -144,6 +144,11 @@ impl<'f, 'n> Lookup<'f, 'n> {
         None
     }
 
+    fn is_coupling(&self, device: DeviceId) -> bool {
+        let pending = self.flat.devices.get(device.0 as usize);
+        pending.is_some_and(|pending| matches!(pending.device.element, Element::Mutual { .. }))
+    }
+
     /// An expression of a scope over nodes and devices.
     pub fn law(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<circuit::Expr> {
         let before = d.len();
@@ -178,7 +183,20 @@ impl<'f, 'n> Lookup<'f, 'n> {
                         minus.unwrap_or(ground),
                     ))
                 }
-                Leaf::Current(device) => match self.device(id, *device, span, d) {
+                Leaf::Current(name) => match self.device(id, *name, span, d) {
+                    Some(device) if self.is_coupling(device) => {
+                        let text = self.names.text(*name);
+                        d.push(
+                            Diagnostic::error(
+                                "E0741",
+                                span,
+                                format!("`{text}` carries no current"),
+                            )
+                            .says("it couples two inductors")
+                            .help("read the current of one of the inductors"),
+                        );
+                        Node::Number(f64::NAN)
+                    }
                     Some(device) => Node::Leaf(circuit::Leaf::Current(device)),
                     None => Node::Number(f64::NAN),
                 },
