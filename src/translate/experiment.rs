@@ -114,7 +114,7 @@ impl Builder<'_> {
                 step: number(step),
                 stop: number(until),
                 start: Some(number(0.0)),
-                hmax: Some(number(step / 10.0)),
+                hmax: Some(number(twelve_digits(step / 10.0))),
                 uic: true,
             });
         }
@@ -255,4 +255,9 @@ fn portable(expr: &GraphExpr) -> bool {
             ) && arguments.iter().all(portable)
         }
     }
+}
+
+/// A value that needs no more than twelve digits: 1e-5/10 is 1e-6 to a reader.
+fn twelve_digits(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
 }
