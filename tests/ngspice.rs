@@ -8,8 +8,9 @@ use bondspice::expr::Expr;
 use bondspice::netlist::Leaf;
 use bondspice::second;
 use bondspice::trace::{Trace, compare, formats};
+use std::io::Write;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use translated::{Translated, models, root, translated};
 
 /// Whether ngspice is there; where it must be and is not, the test fails.
@@ -183,4 +184,27 @@ fn every_model_gives_what_its_own_equations_give() {
         }
         check(&path.display().to_string(), &trace, &reference, &pairs, step * 1e-3, 5e-4);
     }
+}
+
+#[test]
+fn a_netlist_on_standard_input_prints_its_columns() {
+    if !ngspice() {
+        return;
+    }
+    let text = translated(Path::new("rlc.bg"), &Overrides::default()).text();
+    let mut child = Command::new("ngspice")
+        .arg("-b")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    // The table's last page ends where the run ends.
+    let last = said.lines().rfind(|line| line.split_whitespace().count() >= 3).unwrap();
+    let time: f64 = last.split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!((time - 0.02).abs() < 1e-9, "{last}");
 }
