@@ -64,7 +64,7 @@ def main():
         for run, options in RUNS.items():
             reference = read(f"tests/reference/eha/one_line_{run}.csv")
             jump = 0.1 if run == "step" else None
-            arguments = [MODEL, *options, *OBSERVE]
+            arguments = [MODEL, "-q", *options, *OBSERVE]
             subprocess.run([BINARY, "convert", *arguments, "-o", path("as_emitted.cir"), "--map", path("map.json")], check=True)
             text = open(path("as_emitted.cir")).read()
             coarse, count = re.subn(r"(?m)^(\.tran\s+\S+\s+\S+\s+\S+\s+)\S+", r"\g<1>1e-3", text)

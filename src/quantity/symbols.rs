@@ -170,13 +170,22 @@ pub(super) fn nearest_unit(name: &str) -> Option<String> {
     if name.contains(['²', '³']) {
         return Some(name.replace('²', "^2").replace('³', "^3"));
     }
-    if let Some((_, meant)) = FOREIGN.iter().find(|(wrong, _)| *wrong == name) {
+    let words = name.to_lowercase();
+    let foreign = FOREIGN.iter().find(|(wrong, _)| *wrong == name);
+    let spoken = || FOREIGN.iter().find(|(wrong, _)| wrong.len() > 3 && *wrong == words);
+    if let Some((_, meant)) = foreign.or_else(spoken) {
         return Some(meant.to_string());
     }
     if name.chars().count() <= 2 {
         // Nearly every pair of letters is near some unit; only a slip of case says anything.
         let same = |candidate: &str| candidate.to_lowercase() == name.to_lowercase();
         return all_names().find(|candidate| same(candidate));
+    }
+    // A plural, `Ohms`, before two units run together, `Ohm*s`.
+    if let Some(one) =
+        name.strip_suffix('s').filter(|one| one.chars().count() > 2 && is_unit_name(one))
+    {
+        return Some(one.to_string());
     }
     // One letter too many, `uFF`, or two units run together, `kNm`.
     let cuts = || name.char_indices().map(|(at, _)| at).skip(1);

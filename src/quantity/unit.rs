@@ -375,6 +375,9 @@ mod tests {
             ("pa", Some("Pa")),
             ("m3", Some("m^3")),
             ("kNm", Some("kN*m")),
+            ("Ohms", Some("Ohm")),
+            ("bars", Some("bar")),
+            ("Volts", Some("V")),
             ("mHy", Some("mH")),
             ("bananas", None),
         ] {
