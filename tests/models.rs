@@ -372,17 +372,40 @@ fn textbook_cases_over_all_rows() {
     check("E2", &[("q", &|t| 1.0 - (-t / 1.5).exp())]);
 }
 
-#[test]
-fn every_model_has_a_test() {
-    let tests = include_str!("models.rs");
+/// Every shipped model, as a path below `models/` without its ending.
+fn shipped() -> Vec<String> {
     let folder = format!("{}/models", env!("CARGO_MANIFEST_DIR"));
-    for folder in [folder.clone(), format!("{folder}/textbook")] {
+    let mut found = vec![];
+    for (folder, before) in [(folder.clone(), ""), (format!("{folder}/textbook"), "textbook/")] {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|e| e == "bg") {
-                let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
-                assert!(tests.contains(&format!("\"{stem}\"")), "{stem} is not tested");
+                found.push(format!("{before}{}", path.file_stem().unwrap().to_string_lossy()));
             }
         }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn every_model_has_a_test() {
+    let tests = include_str!("models.rs");
+    for model in shipped() {
+        let stem = model.rsplit('/').next().unwrap();
+        assert!(tests.contains(&format!("\"{stem}\"")), "{stem} is not tested");
+    }
+}
+
+#[test]
+fn netlists_read_back_give_the_run_of_their_model() {
+    for model in shipped() {
+        // The golden netlists are what translation writes: another test holds them to that.
+        let name = format!("netlists/{model}.cir");
+        let (mut back, _) = run_text(&name, &file(&name), &Overrides::default())
+            .unwrap_or_else(|diagnostics| panic!("{model}: {diagnostics:#?}"));
+        let trace = run(&model, &Overrides::default());
+        back.units.clone_from(&trace.units);
+        agree(&model, &back, &trace, 1e-12);
     }
 }
