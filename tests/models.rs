@@ -409,3 +409,31 @@ fn netlists_read_back_give_the_run_of_their_model() {
         agree(&model, &back, &trace, 1e-12);
     }
 }
+
+#[test]
+fn laws_over_time_stand_beside_dependent_storages() {
+    // Two inertias on one shaft are one state; V = 10 t on R = 1 and I1 + I2 = 2: i = 10 (t - 2 (1 - exp(-t/2))).
+    let text = "Se:V(10*time) -> 1:a\na -> R:R(1), I:M(1), I:y(1)\nobserve e(V) as \"v\", f(a) as \"i\"\n\
+                simulate until 4 s step 0.25 s\n";
+    let (trace, _) = run_text("ramp.bg", text, &Overrides::default()).expect("it runs");
+    for (row, t) in trace.time().iter().enumerate() {
+        let current = 10.0 * (t - 2.0 * (1.0 - (-t / 2.0).exp()));
+        assert!((column(&trace, "v")[row] - 10.0 * t).abs() < 1e-9, "v at {t}");
+        assert!((column(&trace, "i")[row] - current).abs() < 1e-4 * 22.0, "i at {t}");
+    }
+}
+
+#[test]
+fn switches_stand_beside_dependent_storages() {
+    // The switch closes at 0.5 s: before it hardly any current, after it V/R (1 - exp(-t R/(L1 + L2))).
+    let text = "switch\nV1 a 0 1\nVc c 0 PWL(0 0 1 1)\nS1 a b c 0 sw\nR1 b d 1\nL1 d e 0.1 IC=0\nL2 e 0 0.1 IC=0\n\
+                .model sw SW(vt=0.5 vh=0 ron=1e-6 roff=1e9)\n.print tran i(l1) i(l2)\n.tran 0.01 1 0 0.1 uic\n.end\n";
+    let (trace, _) = run_text("switch.cir", text, &Overrides::default()).expect("it runs");
+    for (row, t) in trace.time().iter().enumerate() {
+        let current = if *t <= 0.5 { 0.0 } else { 1.0 - (-(t - 0.5) * 5.0).exp() };
+        for name in ["i(l1)", "i(l2)"] {
+            let found = column(&trace, name)[row];
+            assert!((found - current).abs() < 2e-3, "{name} at {t}: {found} for {current}");
+        }
+    }
+}

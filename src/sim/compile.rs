@@ -91,6 +91,12 @@ impl<'a> Builder<'a> {
         builder
     }
 
+    /// The input that time is: past every unknown that may yet be added, one for each charge at most, so that laws keep
+    /// their numbers while rates become unknowns.
+    fn time_input(&self) -> usize {
+        self.stamps.unknowns.len() + self.stamps.charges.len()
+    }
+
     fn add_rate(&mut self, k: u32) {
         if self.rate_unknowns.contains_key(&k) {
             return;
@@ -110,16 +116,16 @@ impl<'a> Builder<'a> {
     /// Adds a tree with leaves numbered as [`System::inputs`] says. Rates are the added unknowns, or for output columns
     /// inputs of their own.
     fn add(&self, dag: &mut Dag, law: &Law, output: bool) -> NodeId {
-        let n = self.unknowns.len() as u32;
+        let time = self.time_input() as u32;
         let modes = self.stamps.modes.len() as u32;
         let added: Result<NodeId, Infallible> = dag.add(law, &mut |dag, leaf, _| {
             Ok(dag.input(match leaf {
                 Leaf::Unknown(k) => k.0,
-                Leaf::Time => n,
-                Leaf::Mode(m) => n + 1 + m,
+                Leaf::Time => time,
+                Leaf::Mode(m) => time + 1 + m,
                 Leaf::Rate(k) => match self.rate_unknowns.get(k) {
                     Some(unknown) if !output || self.dependent[*k as usize] => *unknown,
-                    _ => n + 1 + modes + k,
+                    _ => time + 1 + modes + k,
                 },
             }))
         });
@@ -265,12 +271,13 @@ impl<'a> Builder<'a> {
     fn finish(mut self) -> System {
         let stamps = self.stamps;
         let n = self.unknowns.len();
+        let time = self.time_input();
         let charges = stamps.charges.len();
         let mut groups: Vec<LawGroup> = vec![];
         for (mut dag, laws, junction) in std::mem::take(&mut self.groups) {
             let nodes: Vec<NodeId> = laws.iter().map(|law| law.node).collect();
             groups.push(LawGroup {
-                laws: LawSet::new(&mut dag, &nodes, n as u32 + 1),
+                laws: LawSet::new(&mut dag, &nodes, time as u32 + 1),
                 devices: laws.iter().map(|law| law.device).collect(),
                 targets: laws.into_iter().map(|law| law.target).collect(),
                 dynamic: vec![],
@@ -285,7 +292,7 @@ impl<'a> Builder<'a> {
         let conductances = Rows::new(n, self.conductances.clone());
         let charge_rows = Rows::new(charges, self.charge_entries.clone());
         let rates = Rows::new(charges, self.rate_entries.clone());
-        let dynamic = plan_dynamic(n, &conductances, &charge_rows, &rates, &mut groups);
+        let dynamic = plan_dynamic(n, time, &conductances, &charge_rows, &rates, &mut groups);
         let (frozen, node_slots, free_slots) =
             plan_frozen(n, stamps.nodes, &conductances, &charge_rows, &rates, &mut groups);
 
@@ -311,6 +318,7 @@ impl<'a> Builder<'a> {
             columns.iter().map(|(_, law)| self.add(&mut dag, law, true)).collect();
         let output_laws = LawSet::without_derivatives(&dag, &nodes);
         System {
+            time_input: time,
             nodes: stamps.nodes,
             outputs: columns.iter().map(|(name, _)| name.clone()).collect(),
             devices: stamps.devices.clone(),
@@ -371,6 +379,7 @@ impl Plan {
 /// W(α) = G + f' + α·A·(C + q').
 fn plan_dynamic(
     n: usize,
+    time: usize,
     conductances: &Rows,
     charges: &Rows,
     rates: &Rows,
@@ -396,7 +405,7 @@ fn plan_dynamic(
                 match target {
                     Target::Equations(into) => {
                         for (row, factor) in into {
-                            if input == n {
+                            if input == time {
                                 by_time.push((partial, *row, *factor));
                             } else {
                                 let slot = plan.ask(*row as usize, input);

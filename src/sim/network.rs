@@ -142,10 +142,10 @@ impl<'a> Network<'a> {
     }
 
     fn set_inputs(&mut self, x: &[f64], t: f64) {
-        let n = x.len();
-        self.inputs[..n].copy_from_slice(x);
-        self.inputs[n] = t;
-        self.inputs[n + 1..n + 1 + self.modes.len()].copy_from_slice(&self.modes);
+        let time = self.system.time_input;
+        self.inputs[..x.len()].copy_from_slice(x);
+        self.inputs[time] = t;
+        self.inputs[time + 1..time + 1 + self.modes.len()].copy_from_slice(&self.modes);
     }
 
     /// Values of all laws at a point.

@@ -172,6 +172,8 @@ pub struct System {
     /// Names and places of the devices.
     pub devices: Vec<DeviceLabel>,
     pub(crate) charge_devices: Vec<DeviceId>,
+    /// Which input of the programs time is; unknowns stand before it, modes and rates behind it.
+    pub(crate) time_input: usize,
     pub(crate) conductances: Rows,
     /// Constant terms on the right-hand side.
     pub(crate) constants: Vec<(u32, f64)>,
@@ -233,22 +235,22 @@ impl System {
         self.devices.get(id.0 as usize).map_or(Span::NONE, |device| device.span)
     }
 
-    /// Number of inputs of the programs: unknowns, time, modes, rates.
+    /// Number of inputs of the programs: unknowns (with room up to `time_input`), time, modes, rates.
     pub(crate) fn inputs(&self) -> usize {
-        self.equations() + 1 + self.modes.len() + self.charges()
+        self.time_input + 1 + self.modes.len() + self.charges()
     }
 
     /// What an input of the programs is called.
     fn input_name(&self, input: usize) -> String {
-        let n = self.equations();
-        if input < n {
+        let time = self.time_input;
+        if input < time {
             self.unknowns[input].name.clone()
-        } else if input == n {
+        } else if input == time {
             "time".into()
-        } else if input <= n + self.modes.len() {
-            format!("mode({})", self.device_name(self.modes[input - n - 1].device))
+        } else if input <= time + self.modes.len() {
+            format!("mode({})", self.device_name(self.modes[input - time - 1].device))
         } else {
-            let charge = self.charge_devices[input - n - 1 - self.modes.len()];
+            let charge = self.charge_devices[input - time - 1 - self.modes.len()];
             format!("d/dt({})", self.device_name(charge))
         }
     }
