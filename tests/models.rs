@@ -437,3 +437,23 @@ fn switches_stand_beside_dependent_storages() {
         }
     }
 }
+
+#[test]
+fn a_loss_without_slope_at_rest_can_start() {
+    // At the start the capacitor is empty: 8 = f·|f|. At rest 8 = f² + 2f, so f = 2.
+    let text = "Se:U(8) -> 1:a -> R:n(e = f*abs(f)), 0:b\nb -> C:c(0.1), R:r(2)\nobserve f(a) as \"f\"\n\
+                simulate until 4 s step 1 s\n";
+    let (trace, _) = run_text("loss.bg", text, &Overrides::default()).expect("it runs");
+    let flow = column(&trace, "f");
+    assert!((flow[0] - 8f64.sqrt()).abs() < 1e-6, "{flow:?}");
+    assert!((flow[4] - 2.0).abs() < 1e-5, "{flow:?}");
+}
+
+#[test]
+fn stated_node_voltages_are_held_at_the_operating_point() {
+    let text = "ic\nC1 a 0 1u\nR1 a 0 1k\n.ic v(a)=5\n.print tran v(a)\n.tran 10u 1m\n.options reltol=1e-6\n.end\n";
+    let (trace, _) = run_text("ic.cir", text, &Overrides::default()).expect("it runs");
+    for (t, v) in trace.time().iter().zip(column(&trace, "v(a)")) {
+        assert!((v - 5.0 * (-t / 1e-3).exp()).abs() < 5e-5, "{v} at {t}");
+    }
+}

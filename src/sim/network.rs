@@ -300,6 +300,16 @@ impl<'a> Network<'a> {
                 }
             }
         }
+        if self.gmin != 0.0 {
+            for (sum, x) in s.iter_mut().zip(x).take(self.system.nodes) {
+                *sum += (self.gmin * x).abs();
+            }
+        }
+        if self.pin_initial {
+            for (node, value) in &self.system.initial {
+                s[*node as usize] += PIN * (x[*node as usize].abs() + value.abs());
+            }
+        }
     }
 
     /// Q = C·x + q, with the laws' values of the last evaluation.

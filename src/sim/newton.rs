@@ -256,7 +256,8 @@ pub(crate) fn solve_frozen(
             if relative_frozen(network, frozen, x, w, scratch).0 <= RESIDUAL {
                 return Ok(());
             }
-            if linear {
+            // One solve is exact but for rounding, which a second and third one mend.
+            if linear && iteration >= 2 {
                 break;
             }
         }

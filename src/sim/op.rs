@@ -162,6 +162,20 @@ fn find(
     if network.system.is_linear() {
         return Err(first);
     }
+    if matches!(first, Cut::Singular(_)) {
+        // A law may have no slope just where the guess is (f·|f| at rest): look from beside it.
+        for scale in [1.0, -1.0, 1e3, -1e3, 1e6, -1e6] {
+            for (x, floor) in x.iter_mut().zip(floors) {
+                *x = scale * floor;
+            }
+            w.fill(0.0);
+            network.forget_pivots();
+            if solve_frozen(network, &frozen, x, w, q, scratch).is_ok() {
+                return Ok(());
+            }
+        }
+        network.forget_pivots();
+    }
     // gmin stepping
     x.fill(0.0);
     w.fill(0.0);
