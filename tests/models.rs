@@ -411,6 +411,20 @@ fn netlists_read_back_give_the_run_of_their_model() {
 }
 
 #[test]
+fn powers_read_back_have_the_same_bits() {
+    let text = "Se:U(sine(8 Pa, 4 Pa, 1 Hz)) -> 1:a -> R:n(f = orifice(e, 0.05, 0.1)), 0:b\n\
+                b -> C:c(0.1), R:r(e = 0.1*f^3 + 2*f + 0.01*f^5)\nsimulate until 4 s step 0.1 s\n\
+                observe e(b) as \"e\", f(n) as \"f\"\n";
+    let (trace, _) = run_text("orifice.bg", text, &Overrides::default()).expect("it runs");
+    let mut map = bondspice::source::SourceMap::default();
+    let (file, mut d) = (map.add("orifice.bg", text), vec![]);
+    let model = bondspice::cli::pipeline::model(&map, file, &Overrides::default(), &mut d).unwrap();
+    let netlist = bondspice::netlist::write::write(&model.translation.netlist);
+    let (back, _) = run_text("orifice.cir", &netlist, &Overrides::default()).expect("it runs");
+    assert_eq!(back.columns, trace.columns);
+}
+
+#[test]
 fn laws_over_time_stand_beside_dependent_storages() {
     // Two inertias on one shaft are one state; V = 10 t on R = 1 and I1 + I2 = 2: i = 10 (t - 2 (1 - exp(-t/2))).
     let text = "Se:V(10*time) -> 1:a\na -> R:R(1), I:M(1), I:y(1)\nobserve e(V) as \"v\", f(a) as \"i\"\n\

@@ -228,6 +228,26 @@ fn signed_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece {
     Piece::new(format!("sgn({})*{}", base.text, size.at(PRODUCT + 1)), PRODUCT)
 }
 
+/// b^n by squaring, bracketed as `values::power` multiplies, so that a text read back has the same bits; `None` is 1.
+fn whole_product(base: &str, mut exponent: u32) -> Option<String> {
+    let join = |a: &str, b: &str| {
+        let bracket =
+            |part: &str| if part == base { part.to_string() } else { format!("({part})") };
+        format!("{}*{}", bracket(a), bracket(b))
+    };
+    let (mut result, mut square): (Option<String>, _) = (None, base.to_string());
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result = Some(result.map_or_else(|| square.clone(), |so_far| join(&so_far, &square)));
+        }
+        exponent >>= 1;
+        if exponent > 0 {
+            square = join(&square, &square);
+        }
+    }
+    result
+}
+
 /// Small whole and half powers by products and a root.
 fn product_power(base: &Piece, y: f64) -> Option<Piece> {
     let whole = y.abs().trunc();
@@ -239,13 +259,13 @@ fn product_power(base: &Piece, y: f64) -> Option<Piece> {
     {
         return None;
     }
-    let mut parts = vec![base.at(ATOM); factors as usize];
+    let mut parts: Vec<String> = whole_product(&base.at(ATOM), factors).into_iter().collect();
     if half == 0.5 {
         parts.push(format!("sqrt({})", base.text));
     }
     let product = match parts.len() {
         0 => Piece::number(1.0),
-        1 => Piece::new(parts.concat(), ATOM),
+        1 => Piece::new(parts.concat(), if factors > 1 { PRODUCT } else { ATOM }),
         _ => Piece::new(parts.join("*"), PRODUCT),
     };
     Some(if y < 0.0 {

@@ -301,7 +301,7 @@ fn bond_text_has_only_the_brackets_it_needs() {
 fn netlist_text_is_safe_for_signs() {
     for (text, expected) in [
         ("x^2", "v(x)*v(x)"),
-        ("(x+1)^3", "(v(x)+1)*(v(x)+1)*(v(x)+1)"),
+        ("(x+1)^3", "(v(x)+1)*((v(x)+1)*(v(x)+1))"),
         ("2*x^2", "2*(v(x)*v(x))"),
         ("x^-1", "1/v(x)"),
         ("x^0.5", "sqrt(v(x))"),
@@ -309,7 +309,7 @@ fn netlist_text_is_safe_for_signs() {
         ("x^0.3", "exp(0.3*ln(v(x)))"),
         ("x^11", "sgn(v(x))*exp(11*ln(abs(v(x))))"),
         ("signpow(x, 0.5)", "sgn(v(x))*sqrt(abs(v(x)))"),
-        ("abspow(x, 3)", "abs(v(x))*abs(v(x))*abs(v(x))"),
+        ("abspow(x, 3)", "abs(v(x))*(abs(v(x))*abs(v(x)))"),
         ("clamp(x, -1, 1)", "min(max(v(x),-1),1)"),
         ("if x > 1 and not y then x else -x", "(((v(x) > 1) && (!(v(y)))) ? (v(x)) : (-v(x)))"),
         ("a-(-b)", "v(a)-(-v(b))"),
