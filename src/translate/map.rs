@@ -3,11 +3,12 @@
 use super::Builder;
 use super::names::Renamed;
 use super::values::Speaker;
-use crate::bond::graph::{BondId, Law, Power, SignalOrigin, Storage};
-use crate::expr::Node;
+use crate::bond::graph::{self, BondId, Law, Power, SignalOrigin, Storage};
+use crate::expr::{Binary, Node, Unary};
 use crate::netlist::write::expression;
 use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
 use crate::quantity::Domain;
+use std::collections::HashMap;
 
 /// The map of a translation.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,6 +144,7 @@ impl Builder<'_> {
         self.element_variables(&mut variables);
         self.bond_variables(&mut variables);
         self.signal_variables(&mut variables);
+        self.leave_out_observed(&mut variables);
         let cards = self.map_cards();
         let mut nodes = std::collections::HashSet::new();
         for card in &self.cards {
@@ -175,12 +177,49 @@ impl Builder<'_> {
                         "" => observation.si_unit.clone(),
                         unit => unit.to_string(),
                     },
-                    domain: Domain::Any,
+                    domain: self.domain(&observation.expr),
                     observed: true,
                 });
             }
         }
         variables
+    }
+
+    /// The domain of a reading, of a power, or of what is stored; of anything else none is known.
+    fn domain(&self, expr: &graph::Expr) -> Domain {
+        let of = |bond: BondId| self.graph.bond(bond).domain;
+        match &*expr.node {
+            Node::Leaf(graph::Leaf::Bond { bond, .. }) => of(*bond),
+            Node::Leaf(graph::Leaf::Stored(vertex)) => {
+                self.graph.vertex(*vertex).bonds.first().map_or(Domain::Any, |bond| of(*bond))
+            }
+            Node::Unary(Unary::Negate, inner) => self.domain(inner),
+            Node::Binary(Binary::Multiply, a, b) => match (&*a.node, &*b.node) {
+                (
+                    Node::Leaf(graph::Leaf::Bond { bond, variable: Power::Effort, .. }),
+                    Node::Leaf(graph::Leaf::Bond { bond: same, variable: Power::Flow, .. }),
+                ) if bond == same => of(*bond),
+                _ => Domain::Any,
+            },
+            _ => Domain::Any,
+        }
+    }
+
+    /// What an observed column holds under its own name stands there alone.
+    fn leave_out_observed(&self, variables: &mut Vec<Variable>) {
+        let text = |variable: &Variable| {
+            let names = &self.namer.names;
+            variable.expr.as_ref().map(|expr| expression(names, expr))
+        };
+        let observed: HashMap<String, Option<String>> = variables
+            .iter()
+            .filter(|variable| variable.observed)
+            .map(|variable| (variable.bg.clone(), text(variable)))
+            .collect();
+        variables.retain(|variable| {
+            variable.observed
+                || observed.get(&variable.bg).is_none_or(|held| *held != text(variable))
+        });
     }
 
     /// Efforts of 0-junctions, flows of 1-junctions, both of every port, and what is stored.
