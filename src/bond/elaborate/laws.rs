@@ -1,6 +1,6 @@
 //! The law of each element, from its arguments.
 
-use super::scope::{Declaration, Meaning, Scope, did_you_mean};
+use super::scope::{Declaration, Meaning, Scope, a, did_you_mean};
 use super::value::{Place, varies};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
@@ -291,7 +291,7 @@ impl Scope<'_> {
 
     fn no_value(&self, declaration: &Declaration<'_>, argument: &Argument) -> Diagnostic {
         let element = declaration.element;
-        Diagnostic::error("E0209", argument.span, format!("a {} has no arguments", element.noun))
+        Diagnostic::error("E0209", argument.span, format!("{} has no arguments", a(element.noun)))
             .says("leave this out")
     }
 
@@ -314,7 +314,7 @@ impl Scope<'_> {
         let error = Diagnostic::error(
             "E0209",
             label.span,
-            format!("a {} has no argument `{written}`", declaration.element.noun),
+            format!("{} has no argument `{written}`", a(declaration.element.noun)),
         )
         .says("not one of its arguments")
         .help(usage(shape));

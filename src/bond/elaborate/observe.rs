@@ -33,7 +33,10 @@ impl Scope<'_> {
             }
         };
         let nothing = columns.is_empty() && d.len() == before;
-        self.graph.experiment.observe = if nothing { self.default_columns() } else { columns };
+        self.graph.experiment.observe = match nothing {
+            true => self.columns_of_any(),
+            false => columns,
+        };
     }
 
     /// Notes the units of signals that are known.
@@ -67,6 +70,14 @@ impl Scope<'_> {
                 continue;
             }
             let Some(column) = self.column(item, given, d) else { continue };
+            if column.name == "time" {
+                d.push(
+                    Diagnostic::error("E0221", item.span, "two columns would be headed `time`")
+                        .says("this one, and the first of every result")
+                        .help("give it another name: `… as \"name\"`"),
+                );
+                continue;
+            }
             if let Some(first) = heads.insert(column.name.clone(), item.span) {
                 d.push(
                     Diagnostic::error(
@@ -145,6 +156,16 @@ impl Scope<'_> {
             Dim::Known(dimension) if known.is_empty() => si_text(dimension),
             _ => known,
         }
+    }
+
+    /// The default columns; where a graph has none, e and f of every element.
+    fn columns_of_any(&self) -> Vec<Observation> {
+        let columns = self.default_columns();
+        if !columns.is_empty() {
+            return columns;
+        }
+        let all = observables(&self.graph).into_iter();
+        all.filter(|column| !column.name.starts_with("power(")).collect()
     }
 
     /// Inputs, outputs, signals, e of 0-junctions, f of 1-junctions, q and p of storages, each in file order.

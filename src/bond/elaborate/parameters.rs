@@ -1,7 +1,7 @@
 //! Parameters: overrides, order of evaluation, values.
 
 use super::dimensions::Dim;
-use super::scope::{Meaning, Scope, did_you_mean};
+use super::scope::{Meaning, Scope, a, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, parse_value};
@@ -79,6 +79,9 @@ impl Scope<'_> {
                     (true, _) => {
                         error.help("signals and inputs are not set; `--drive` drives an input")
                     }
+                    _ if self.vertices.contains_key(name.as_str()) => {
+                        self.value_of_element(name, error)
+                    }
                     (_, Some(meant)) => did_you_mean(error, Span::NONE, meant),
                     _ => error,
                 });
@@ -101,6 +104,24 @@ impl Scope<'_> {
             }
         }
         overridden
+    }
+
+    /// How the value of an element that was taken for a parameter can be set.
+    fn value_of_element(&self, name: &str, error: Diagnostic) -> Diagnostic {
+        let declaration = self.declarations[self.vertices[name].index()];
+        let noun = a(declaration.element.noun);
+        let value = match declaration.arguments {
+            Some([argument]) if argument.label.is_none() => self.map.text(argument.span),
+            _ => "",
+        };
+        let error = error.label(declaration.span, format!("`{name}` is {noun}"));
+        if value.is_empty() {
+            return error.help("give it the value of a parameter, and the parameter can be set");
+        }
+        error.help(format!(
+            "`{name}` is {noun} with the value {value}; write `param {name} = {value}` and \
+             `{name}` without a value, and it can be set"
+        ))
     }
 
     /// Evaluates a parameter after those that it uses, without recursion: a chain may be as long as the file.

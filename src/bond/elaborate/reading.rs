@@ -1,6 +1,6 @@
 //! Readings: e(x), f(x), q(x), p(x), power(x), and e(a -> b), f(a -> b), power(a -> b).
 
-use super::scope::Scope;
+use super::scope::{Scope, a};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
 use crate::bond::syntax::{Call, Path, Value};
@@ -64,14 +64,14 @@ impl Scope<'_> {
         let wrong = |message: String| {
             Diagnostic::error("E0214", span, message)
                 .says("cannot be read")
-                .label(declaration.span, format!("`{name}` is a {noun}"))
+                .label(declaration.span, format!("`{name}` is {}", a(noun)))
         };
         if matches!(what, "q" | "p") {
             let stored = if what == "q" { Shape::Compliance } else { Shape::Inertia };
             if shape == stored {
                 return Some(self.stored(id, span));
             }
-            let error = wrong(format!("a {noun} stores no `{what}`"));
+            let error = wrong(format!("{} stores no `{what}`", a(noun)));
             d.push(match shape {
                 Shape::Compliance => error.help(format!("a compliance stores q: `q({name})`")),
                 Shape::Inertia => error.help(format!("an inertia stores p: `p({name})`")),

@@ -317,6 +317,11 @@ impl<'a> Scope<'a> {
 /// Names that mean something of their own in a law.
 pub(super) const RESERVED: [&str; 6] = ["e", "f", "q", "p", "time", "pi"];
 
+/// A noun with its article: `an inertia`.
+pub(super) fn a(noun: &str) -> String {
+    format!("{} {noun}", if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
+}
+
 /// Adds the nearest name as a hint and a fix.
 pub(super) fn did_you_mean(error: Diagnostic, span: Span, meant: &str) -> Diagnostic {
     let error = error.help(format!("did you mean `{meant}`?"));

@@ -1,6 +1,6 @@
 //! Bonds: which ports they join, and whether every port has what it needs.
 
-use super::scope::Scope;
+use super::scope::{Scope, a};
 use crate::bond::graph::*;
 use crate::bond::syntax::{Arrow, ChainEnd, Path};
 use crate::diagnostic::Diagnostic;
@@ -91,11 +91,11 @@ impl Scope<'_> {
         let error =
             Diagnostic::error("E0410", span, format!("`{name}` has no port `{}`", member.text))
                 .says("no such port")
-                .label(declaration.span, format!("`{name}` is a {noun}"));
+                .label(declaration.span, format!("`{name}` is {}", a(noun)));
         d.push(if two_port {
-            error.help(format!("the ports of a {noun} are `{name}.1` and `{name}.2`"))
+            error.help(format!("the ports of {} are `{name}.1` and `{name}.2`", a(noun)))
         } else {
-            error.help(format!("the ports of a {noun} have no names: write `{name}`"))
+            error.help(format!("the ports of {} have no names: write `{name}`", a(noun)))
         });
         None
     }

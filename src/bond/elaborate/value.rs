@@ -1,6 +1,6 @@
 //! Expressions: from names to what they mean.
 
-use super::scope::{Meaning, RESERVED, Scope, did_you_mean};
+use super::scope::{Meaning, RESERVED, Scope, a, did_you_mean};
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Path};
 use crate::diagnostic::Diagnostic;
@@ -170,7 +170,7 @@ impl Scope<'_> {
         if self.vertices.contains_key(name) {
             let vertex = self.declarations[self.vertices[name].index()];
             return error
-                .label(vertex.span, format!("`{name}` is a {}", vertex.element.noun))
+                .label(vertex.span, format!("`{name}` is {}", a(vertex.element.noun)))
                 .help(format!("to read its variables write `e({name})`, `f({name})`"));
         }
         let known = self

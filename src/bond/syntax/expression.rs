@@ -68,7 +68,13 @@ impl Reader<'_> {
             let place = self.place(&part);
             match part.as_rule() {
                 Rule::literal => value = self.source(place).parse().unwrap_or(f64::NAN),
-                _ => unit = Some(self.unit(place, d)?),
+                _ => match bare_prefix(self.source(place)) {
+                    Some(power) => {
+                        d.push(self.no_unit(span, place, power));
+                        return None;
+                    }
+                    None => unit = Some(self.unit(place, d)?),
+                },
             }
         }
         let node = match unit {
@@ -86,6 +92,19 @@ impl Reader<'_> {
             return None;
         }
         Some(Expr::new(node, span))
+    }
+
+    /// A prefix that stands on a number without a unit.
+    fn no_unit(&self, span: Span, place: Span, power: &str) -> Diagnostic {
+        let prefix = self.source(place);
+        let literal = self.source(Span { end: place.start, ..span }).trim_end();
+        let meant = match literal.contains(['e', 'E']) {
+            true => format!("{literal}*1{power}"),
+            false => format!("{literal}{power}"),
+        };
+        Diagnostic::error("E0301", place, format!("`{prefix}` is not a unit that I know"))
+            .says("a prefix without a unit")
+            .help(format!("prefixes stand on units, never on bare numbers: write `{meant}`"))
     }
 
     /// The unit that stands at `span`.
@@ -164,6 +183,20 @@ impl Reader<'_> {
         }
         (!failed).then_some(rows)
     }
+}
+
+/// What a prefix of SPICE, or of units, means where it is no unit itself.
+fn bare_prefix(text: &str) -> Option<&'static str> {
+    Some(match text {
+        "k" => "e3",
+        "M" | "Meg" | "MEG" | "meg" => "e6",
+        "G" => "e9",
+        "u" | "µ" | "μ" => "e-6",
+        "n" => "e-9",
+        "p" => "e-12",
+        "f" => "e-15",
+        _ => return None,
+    })
 }
 
 /// Reads a unit; an error names the nearest.
