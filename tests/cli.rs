@@ -251,6 +251,159 @@ fn the_command_line_beats_the_file() {
     assert!((rows[2][1] - (-0.25_f64).exp()).abs() < 1e-6, "{rows:?}");
 }
 
+/// A folder with `m.bg`: the smallest model that runs, with another first line.
+fn model_with(text: &str) -> tempfile::TempDir {
+    let folder = models();
+    let text = format!("{text}\nsimulate until 1 s step 100 ms\n");
+    std::fs::write(folder.path().join("m.bg"), text).unwrap();
+    folder
+}
+
+#[test]
+fn a_graph_without_default_columns_shows_its_elements() {
+    let folder = model_with("Se:u(1 V) -> R:r(1 Ohm)");
+    let output = bondspice(folder.path(), &["simulate", "m.bg", "-q"]);
+    assert_eq!(stdout(&output).lines().next(), Some("time,e(u),f(u),e(r),f(r)"));
+    let verified = bondspice(folder.path(), &["verify", "m.bg"]);
+    assert_eq!(code(&verified), 0, "{}", stderr(&verified));
+    assert!(stdout(&verified).contains("e(r)"), "{}", stdout(&verified));
+}
+
+#[test]
+fn a_time_beyond_the_run_is_refused() {
+    let folder = model_with("Se:u(1 V) -> R:r(1 Ohm)");
+    let run = |times: &str| {
+        std::fs::write(folder.path().join("times"), times).unwrap();
+        bondspice(folder.path(), &["simulate", "m.bg", "-q", "--times", "times"])
+    };
+    let output = run("0\n0.5\n1.5\n");
+    assert_eq!((code(&output), stdout(&output)), (3, String::new()));
+    assert!(stderr(&output).contains("E0933") && stderr(&output).contains("1.5 s"));
+    assert_eq!(rows(&stdout(&run("0.5\n1\n1.0000000000000002\n"))).len(), 3);
+}
+
+#[test]
+fn two_outputs_need_two_places() {
+    let folder = models();
+    for arguments in [
+        &["-o", "m.json", "--map", "m.json"][..],
+        &["-o", "m.json", "--map", "./m.json"],
+        &["-o", "-", "--map", "-"],
+        &["--map", "-"],
+    ] {
+        let arguments = [&["convert", "rlc.bg"], arguments].concat();
+        let output = bondspice(folder.path(), &arguments);
+        assert_eq!((code(&output), stdout(&output)), (2, String::new()), "{arguments:?}");
+        assert!(stderr(&output).contains("E0940"), "{}", stderr(&output));
+    }
+    assert!(!folder.path().join("m.json").exists());
+}
+
+#[test]
+fn options_are_checked_at_their_place() {
+    let folder = model_with("Se:u(1 V) -> R:r(1 Ohm)\noptions relto = 1e-4");
+    let run = |arguments: &[&str]| {
+        let output =
+            bondspice(folder.path(), &[arguments, &["--message-format", "short"]].concat());
+        (code(&output), stderr(&output))
+    };
+    let (denied, said) = run(&["check", "m.bg", "--deny", "warnings"]);
+    assert_eq!(denied, 1, "{said}");
+    assert!(said.starts_with("m.bg:2:9: warning[W0801]"), "{said}");
+    let (fine, said) = run(&["simulate", "m.bg", "-o", "m.csv"]);
+    assert_eq!((fine, said.matches("W0801").count()), (0, 1), "{said}");
+    assert!(said.contains("m.bg:2:9: warning[W0801]"), "{said}");
+    let human = bondspice(folder.path(), &["check", "m.bg"]);
+    assert!(stderr(&human).contains("did you mean `reltol`?"), "{}", stderr(&human));
+    let (wrong, said) = run(&["check", "rlc.bg", "--option", "reltol=much"]);
+    assert_eq!((wrong, said.matches("E0807").count()), (3, 1), "{said}");
+}
+
+#[test]
+fn quiet_wins_over_verbose() {
+    let folder = models();
+    let output = bondspice(folder.path(), &["simulate", "rlc.bg", "-q", "-v", "-o", "x.csv"]);
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+}
+
+#[test]
+fn a_second_column_time_is_an_error_at_its_place() {
+    let folder = model_with("Se:u(1 V) -> R:r(1 Ohm)\nobserve e(r) as \"time\"");
+    let output = bondspice(folder.path(), &["simulate", "m.bg", "--message-format", "short"]);
+    assert_eq!(code(&output), 3);
+    assert!(stderr(&output).starts_with("m.bg:2:9: error[E0221]"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_variable_stands_in_the_map_once() {
+    let folder = models();
+    let observed = ["--observe", "e(C) in mV, f(mesh), q(C), f(R)*1 as \"x\""];
+    let arguments = [&["convert", "rlc.bg", "-q", "-o", "c.cir", "--map", "m.json"], &observed[..]];
+    assert_eq!(code(&bondspice(folder.path(), &arguments.concat())), 0);
+    let text = std::fs::read_to_string(folder.path().join("m.json")).unwrap();
+    let map: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let variables = map["variables"].as_array().unwrap();
+    let of = |name: &str| variables.iter().filter(|v| v["bg"] == name).collect::<Vec<_>>();
+    for name in ["e(C)", "f(mesh)", "q(C)"] {
+        let found = of(name);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(
+            (&found[0]["observed"], &found[0]["domain"]),
+            (&true.into(), &"electrical".into())
+        );
+    }
+    assert_eq!(of("x")[0]["domain"], "any");
+    assert_eq!(of("e(R)")[0]["observed"], false);
+}
+
+#[test]
+fn negative_and_endless_times_are_told_as_such() {
+    let folder = models();
+    for (arguments, exit, told) in [
+        (&["simulate", "rlc.bg", "--until", "-1ms"][..], 3, "must be positive"),
+        (&["simulate", "rlc.bg", "--step", "-1ms"], 3, "must be positive"),
+        (&["compare", "a.csv", "b.csv", "--tolerance", "-1"], 2, "cannot be negative"),
+        (&["simulate", "rlc.bg", "--until", "1e300"], 3, "more than 1e9 rows"),
+        (&["simulate", "rlc.bg", "--step", "1e-300s"], 3, "more than 1e9 rows"),
+        (&["simulate", "rc.cir", "--step", "1e-300"], 3, "more than 1e9 rows"),
+    ] {
+        let output = bondspice(folder.path(), arguments);
+        assert_eq!((code(&output), stdout(&output)), (exit, String::new()), "{arguments:?}");
+        assert!(stderr(&output).contains(told), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_netlist_has_no_graph() {
+    let folder = models();
+    for command in ["causality", "convert", "verify"] {
+        let output = bondspice(folder.path(), &[command, "rc.cir"]);
+        assert_eq!((code(&output), stdout(&output)), (2, String::new()), "{command}");
+        assert!(stderr(&output).contains("E0944"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn hints_lead_somewhere() {
+    let folder = models();
+    let said = |line: &str, arguments: &[&str]| {
+        std::fs::write(folder.path().join("m.bg"), format!("{line}\n")).unwrap();
+        let output = bondspice(folder.path(), &[&["check", "m.bg"], arguments].concat());
+        assert_eq!(code(&output), 3, "{}", stdout(&output));
+        stderr(&output)
+    };
+    for (value, meant) in [("1k", "1e3"), ("2.5M", "2.5e6"), ("1 u", "1e-6"), ("10meg", "10e6")] {
+        let text = said(&format!("param a = {value}"), &[]);
+        let hint = format!("prefixes stand on units, never on bare numbers: write `{meant}`");
+        assert!(text.contains(&hint) && !text.contains("write `1K`"), "{text}");
+    }
+    let text = said("Se:u(1 V) -> I:L(1 mH)", &["--set", "L=2mH"]);
+    let hint = "`L` is an inertia with the value 1 mH; write `param L = 1 mH`";
+    assert!(text.contains("E0223") && text.contains(hint), "{text}");
+    let text = said("Se:u(1 V) -> I:L(1 mH)\nobserve q(L)", &[]);
+    assert!(text.contains("an inertia stores no `q`"), "{text}");
+}
+
 #[test]
 fn standard_input_is_read_and_told_apart() {
     let folder = models();
@@ -401,7 +554,7 @@ fn an_interrupt_keeps_what_was_computed() {
     let folder = models();
     std::fs::write(folder.path().join("run.csv"), "precious\n").unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_bondspice"))
-        .args(["simulate", "rlc.bg", "--step", "1us", "--until", "10000s", "-o", "run.csv"])
+        .args(["simulate", "rlc.bg", "--step", "1us", "--until", "500s", "-o", "run.csv"])
         .current_dir(folder.path())
         .stderr(Stdio::piped())
         .spawn()

@@ -27,6 +27,7 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
     let overrides = arguments.model.overrides(session)?;
     let file = session.load(&arguments.file)?;
+    pipeline::require_bond(session, file, "asked for its causality")?;
     let mut d = vec![];
     let graph = pipeline::graph(&session.map, file, &overrides, &mut d);
     let found = graph.map(|graph| {

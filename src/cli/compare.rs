@@ -23,10 +23,10 @@ pub struct Arguments {
     /// The reference: CSV, RAW or JSON; - for standard input
     reference: String,
     /// Largest error allowed, as a part of the reference's range
-    #[arg(long, default_value_t = 1e-3, value_name = "X")]
+    #[arg(long, default_value_t = 1e-3, value_name = "X", allow_hyphen_values = true)]
     tolerance: f64,
     /// Duration of the rises that stand for jumps, in seconds: rows that close to a jump are skipped
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     rise: Option<f64>,
     /// Signals to compare, REFERENCE[=TRACE], …; without it every column of the reference
     #[arg(long, value_name = "NAMES")]

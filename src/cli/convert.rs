@@ -4,10 +4,11 @@ use super::emit::Stage;
 use super::flags::ModelFlags;
 use super::output::write_text;
 use super::pipeline;
-use super::session::{Exit, Session};
+use super::session::{Exit, Session, same_file};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::write;
 use crate::source::Span;
+use std::path::Path;
 
 /// What it does, in a line.
 pub const ABOUT: &str = "Turn a bond graph into a netlist";
@@ -58,12 +59,18 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         };
         return Err(session.fail(Diagnostic::error("E0943", Span::NONE, message)));
     }
+    if arguments.emit.is_none() && one_output(arguments) {
+        let message = "the netlist and the map cannot be written to one place";
+        let error = Diagnostic::error("E0940", Span::NONE, message);
+        return Err(session.fail(error.help("give -o and --map two names")));
+    }
     let overrides = arguments.model.overrides(session)?;
     let file = session.load(&arguments.file)?;
     if let Some(stage) = arguments.emit {
         let text = pipeline::emit(session, file, &overrides, stage)?;
         return write_text(arguments.output.as_deref(), &text, session);
     }
+    pipeline::require_bond(session, file, "converted")?;
     let mut d = vec![];
     let model = pipeline::model(&session.map, file, &overrides, &mut d);
     session.say(d);
@@ -77,4 +84,17 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         write_text(Some(name), &(map.unwrap_or_default() + "\n"), session)?;
     }
     Ok(())
+}
+
+/// Whether the netlist and the map would go to one file, or both to standard output.
+fn one_output(arguments: &Arguments) -> bool {
+    match (arguments.output.as_deref().unwrap_or("-"), arguments.map.as_deref()) {
+        (_, None) => false,
+        ("-", Some(map)) => map == "-",
+        (netlist, Some(map)) => {
+            let (netlist, map) = (Path::new(netlist), Path::new(map));
+            // Devices, as /dev/null, take both.
+            same_file(netlist, map) && netlist.metadata().map_or(true, |m| m.is_file())
+        }
+    }
 }

@@ -21,10 +21,10 @@ pub struct ModelFlags {
     #[arg(long, value_name = "KEY=VALUE")]
     pub option: Vec<String>,
     /// End of the run: 1.5s
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub until: Option<String>,
     /// Output interval: 1ms
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub step: Option<String>,
 }
 

@@ -12,7 +12,8 @@ use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::netlist::header::Header;
 use crate::netlist::{Netlist, flatten, read, write};
-use crate::sim::{self, Failure, FailureKind, Settings, Statistics, System};
+use crate::quantity::nearest;
+use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
 use crate::trace::{Sink, Trace};
 use crate::translate::{self, Translation};
@@ -53,6 +54,18 @@ pub fn language(map: &SourceMap, file: FileId) -> Language {
     Language::Netlist
 }
 
+/// Refuses a netlist where only a bond graph has what is asked for.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn require_bond(session: &mut Session, file: FileId, what: &str) -> Result<(), Exit> {
+    if language(&session.map, file) == Language::Bond {
+        return Ok(());
+    }
+    let error = Diagnostic::error("E0944", Span::NONE, format!("only a bond graph can be {what}"));
+    Err(session.fail(error.help("the name of a file with a bond graph ends in .bg")))
+}
+
 /// The graph of a bond-graph text.
 pub fn graph(
     map: &SourceMap,
@@ -61,7 +74,45 @@ pub fn graph(
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
     let syntax = syntax::parse(map, file, d);
+    check_options(&syntax, overrides, d);
     elaborate::elaborate(&syntax, map, overrides, d)
+}
+
+/// Checks the options of a file and of the command line, each at its place.
+fn check_options(syntax: &syntax::File, overrides: &Overrides, d: &mut Vec<Diagnostic>) {
+    // A run of any length: only whether it takes the options is asked.
+    let mut settings = Settings::new(1.0);
+    let mut check = |key: &str, value: &str, key_span: Span, value_span: Span| {
+        let Err(found) = settings.set(key, value) else { return };
+        let mut found = *found;
+        let unknown = found.code == "W0801";
+        let span = if unknown { key_span } else { value_span };
+        if !span.is_none() {
+            found = found.label(span, if unknown { "unknown option" } else { "not a value of it" });
+        }
+        let known = sim::OPTIONS.iter().map(|row| row.name);
+        match nearest(key, known).filter(|_| unknown) {
+            Some(meant) => {
+                let found = found.help(format!("did you mean `{meant}`?"));
+                let edit = vec![(span, meant.to_string())];
+                d.push(match span.is_none() {
+                    true => found,
+                    false => found.fix(format!("write `{meant}`"), edit),
+                });
+            }
+            None => d.push(found),
+        }
+    };
+    for statement in &syntax.statements {
+        if let syntax::StatementKind::Options(options) = &statement.kind {
+            for (key, value) in options {
+                check(&key.text, &value.text, key.span, value.span);
+            }
+        }
+    }
+    for (key, value) in &overrides.options {
+        check(key, value, Span::NONE, Span::NONE);
+    }
 }
 
 /// The causality of a graph.
@@ -231,7 +282,16 @@ pub fn ready(
         Some(pick) => pick == Pick::Op,
         None => circuit.analyses.last() == Some(&Analysis::OperatingPoint),
     };
+    let before = d.len();
     let settings = if point { None } else { Some(Settings::of(&circuit, native, d)?) };
+    // What the file's own options are wrong about has been said at their place.
+    let (said, again) = d.split_at(before);
+    let again: Vec<_> = again.iter().filter(|d| !says(said, d)).cloned().collect();
+    d.truncate(before);
+    d.extend(again);
+    if let Some(settings) = &settings {
+        limit_rows(settings, d)?;
+    }
     let system = sim::compile(&stamps, d)?;
     let mut names: Vec<String> = if point { vec![] } else { vec!["time".into()] };
     names.extend(stamps.outputs.iter().map(|(name, _)| name.clone()));
@@ -247,6 +307,26 @@ pub fn ready(
     }
     let analyses = circuit.analyses.len();
     Some(Run { title: circuit.title, names, units, stamps, system, settings, analyses })
+}
+
+/// Whether a warning or error has been said, wherever.
+fn says(said: &[Diagnostic], diagnostic: &Diagnostic) -> bool {
+    said.iter().any(|d| (d.code, &d.message) == (diagnostic.code, &diagnostic.message))
+}
+
+/// More rows than this are a slip of the pen.
+const MOST_ROWS: f64 = 1e9;
+
+fn limit_rows(settings: &Settings, d: &mut Vec<Diagnostic>) -> Option<()> {
+    let Interval::Grid(step) = settings.rows else { return Some(()) };
+    let span = settings.stop - settings.start;
+    if span / step <= MOST_ROWS {
+        return Some(());
+    }
+    let message = format!("a row every {step:e} s for {span:e} s: that is more than 1e9 rows");
+    let error = Diagnostic::error("E0807", Span::NONE, message);
+    d.push(error.help("end the run earlier (--until), or give a longer output interval (--step)"));
+    None
 }
 
 impl Run {

@@ -197,11 +197,19 @@ pub fn exit_of(code: &str) -> Exit {
 }
 
 /// Whether two paths lead to one file.
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(super) fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b || same_inode(&a, &b),
-        _ => a == b,
+        (Err(_), Err(_)) => a == b || (a.file_name() == b.file_name() && folder(a) == folder(b)),
+        _ => false,
     }
+}
+
+/// The folder of a file that need not be there yet.
+fn folder(path: &Path) -> Option<PathBuf> {
+    let parent = path.parent()?;
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+    parent.canonicalize().ok()
 }
 
 #[cfg(unix)]

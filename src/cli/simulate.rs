@@ -87,7 +87,7 @@ fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> 
     let times = arguments.times.as_deref().map(|name| read_times(name, session)).transpose()?;
     let mut run = prepare(arguments, file, &overrides, session)?;
     if let (Some(times), Some(settings)) = (times, &mut run.settings) {
-        settings.rows = Interval::Times(times);
+        set_times(times, settings).map_err(|error| session.fail(*error))?;
     }
     go(arguments, &mut run, session)
 }
@@ -173,9 +173,29 @@ fn say_statistics(arguments: &Arguments, statistics: &Statistics, session: &Sess
         // Asked for, so said even when quiet.
         Some("json") => eprintln!("{}", statistics.to_json()),
         Some(_) => eprintln!("{statistics}"),
-        None if session.global.verbose => eprintln!("{statistics}"),
+        None if session.global.verbose && !session.global.quiet => eprintln!("{statistics}"),
         None => {}
     }
+}
+
+/// Rows at these times, all of which the run must reach.
+fn set_times(times: Vec<f64>, settings: &mut Settings) -> Result<(), Box<Diagnostic>> {
+    let (start, stop) = (settings.start, settings.stop);
+    let outside = |message: String| {
+        let error = Diagnostic::error("E0933", Span::NONE, message);
+        Err(Box::new(error.help("leave the time out, or set the run's end with --until")))
+    };
+    if let Some(time) = times.iter().find(|time| **time < start) {
+        return outside(format!("there is no row at {time} s: they begin at {start} s"));
+    }
+    // What rounding adds to a time is no time of its own.
+    let reached = stop * (1.0 + 1e-12);
+    if let Some(time) = times.iter().find(|time| **time > reached) {
+        return outside(format!("there is no row at {time} s: the run ends at {stop} s"));
+    }
+    settings.stop = times.last().map_or(stop, |last| last.max(stop));
+    settings.rows = Interval::Times(times);
+    Ok(())
 }
 
 /// Times of rows, one a line.
