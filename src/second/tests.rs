@@ -328,3 +328,38 @@ fn a_source_that_jumps_across_a_storage_moves_it_at_once() {
         near(run.columns[2][row], u / 4.0, 1e-6);
     }
 }
+
+#[test]
+fn what_follows_a_source_at_once_is_right_between_the_steps() {
+    // 2·sin(44 t) across 1 ohm: no state at all.
+    let mut b = Build::default();
+    let w = 14.0 * std::f64::consts::PI;
+    let u = b.signal("u", sine(2.0, w));
+    let source = b.vertex("Se", "U", effort_source(Expr::leaf(Leaf::Signal(u))));
+    let r = b.vertex("R", "R", resistor(1.0));
+    let bond = b.bond(source, r);
+    b.observe_bond("f", bond, Power::Flow);
+    let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.01).collect();
+    let run = run(&b.graph, &times);
+    for (t, f) in run.columns[0].iter().zip(&run.columns[1]) {
+        near(*f, 2.0 * (w * t).sin(), 1e-6);
+    }
+    near(run.energy.delivered, 2.0, 1e-6);
+}
+
+#[test]
+fn a_source_across_a_storage_gives_the_current_between_the_steps() {
+    // C = 3 behind 2·sin(44 t): the current is 6·44·cos(44 t).
+    let mut b = Build::default();
+    let w = 14.0 * std::f64::consts::PI;
+    let u = b.signal("u", sine(2.0, w));
+    let source = b.vertex("Se", "U", effort_source(Expr::leaf(Leaf::Signal(u))));
+    let c = b.vertex("C", "C", compliance(3.0, StoreInitial::Unstated));
+    let bond = b.bond(source, c);
+    b.observe_bond("f", bond, Power::Flow);
+    let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.01).collect();
+    let run = run(&b.graph, &times);
+    for (t, f) in run.columns[0].iter().zip(&run.columns[1]) {
+        near(f / (6.0 * w), (w * t).cos(), 2e-6);
+    }
+}
