@@ -237,10 +237,6 @@ fn first_step(radau: &mut Radau, from: f64, to: f64, y: &[f64], last: Option<f64
 /// Below this part of the largest effort or flow of the same kind a value counts as what rounding leaves of 0.
 const ROUNDING: f64 = 1e-8;
 
-/// How much more error is allowed to unknowns of index 2: their estimate carries rounding of the states divided by the
-/// step, and they do not act on the states by more than the step times their error.
-const INDEX_TWO: f64 = 100.0;
-
 /// The largest magnitude of each unknown so far, and what is not to be told from 0.
 struct Sizes {
     largest: Vec<f64>,
@@ -304,7 +300,9 @@ impl Sizes {
     }
 
     /// The error allowed: the tolerance times the size, and not less than a hundred-millionth of that of the largest
-    /// unknown of the same kind, below which a value is what rounding leaves of 0.
+    /// unknown of the same kind, below which a value is what rounding leaves of 0. Unknowns of index 2 are not tested
+    /// (infinity): their estimate carries rounding of the states divided by the step, and they act on the states by no
+    /// more than the step times their error.
     fn weights(&self, tolerance: f64, pilot: bool) -> Vec<f64> {
         let largest = self.largest_of_kinds();
         let least = if pilot { 1e-6 } else { ROUNDING };
@@ -316,8 +314,10 @@ impl Sizes {
                     Kind::Power(kind) => least * largest[*kind],
                     Kind::Other => 0.0,
                 };
-                let part = if *index_two { tolerance * INDEX_TWO } else { tolerance };
-                part * size.max(floor).max(1e-15)
+                if *index_two {
+                    return f64::INFINITY;
+                }
+                tolerance * size.max(floor).max(1e-15)
             })
             .collect()
     }

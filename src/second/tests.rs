@@ -363,3 +363,25 @@ fn a_source_across_a_storage_gives_the_current_between_the_steps() {
         near(f / (6.0 * w), (w * t).cos(), 2e-6);
     }
 }
+
+#[test]
+fn a_tank_with_two_compliances_starts_whatever_rounding_leaves_of_its_constraint() {
+    // e = 0.23·cos(w t) with w² = 1/(1 + 0.87).
+    let mut b = Build::default();
+    let zero = b.zero("a");
+    let c1 = b.vertex("C", "a", compliance(1.0, power(0.23)));
+    let i = b.vertex("I", "L", inertia(1.0, StoreInitial::Unstated));
+    let c2 = b.vertex("C", "b", compliance(0.87, StoreInitial::Unstated));
+    let first = b.bond(zero, c1);
+    b.bond(zero, i);
+    let second = b.bond(zero, c2);
+    b.observe_bond("e", first, Power::Effort);
+    b.observe_bond("f", second, Power::Flow);
+    let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.1).collect();
+    let run = run(&b.graph, &times);
+    let w = (1.0f64 / 1.87).sqrt();
+    for (row, t) in run.columns[0].iter().enumerate() {
+        near(run.columns[1][row], 0.23 * (w * t).cos(), 1e-7);
+        near(run.columns[2][row], -0.23 * 0.87 * w * (w * t).sin(), 1e-6);
+    }
+}
