@@ -7,7 +7,7 @@ use super::system::{LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System,
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Dag, NodeId};
+use crate::expr::{Binary, Dag, Function, Node, NodeId};
 use crate::linear::{Lu, Pattern};
 use crate::source::Span;
 use std::collections::BTreeMap;
@@ -33,12 +33,60 @@ pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
     builder.place_laws();
     builder.reduce();
     let system = builder.finish();
+    warn_of_jumps(stamps, d);
     match check(&system) {
         Ok(()) => Some(system),
         Err(singular) => {
             d.extend(explain::undetermined(&system, &singular));
             None
         }
+    }
+}
+
+/// Conditions are met by steps as they come: one that only bends its law is error control's, but a jump between two
+/// steps may be missed, so whoever wrote it should know.
+fn warn_of_jumps(stamps: &Stamps, d: &mut Vec<Diagnostic>) {
+    let laws = stamps.laws.iter().map(|stamp| &stamp.law);
+    let charges = stamps.charges.iter().filter_map(|charge| charge.law.as_ref());
+    let mut places: Vec<Span> = laws.chain(charges).filter_map(condition).collect();
+    places.sort();
+    places.dedup();
+    for place in places {
+        d.push(
+            Diagnostic::warning("W0802", place, "jumps of this condition are not located")
+                .because("steps are sized by the error of the solution; one may pass over a short interval unseen")
+                .help(
+                    "write jumps in time as `step`, `pulse` or `pwl` (PULSE, PWL), or limit steps by the option hmax; \
+                     a law without a jump there needs nothing",
+                ),
+        );
+    }
+}
+
+/// The first comparison, `floor` or `mod` of a law that stands in a text.
+fn condition(law: &Law) -> Option<Span> {
+    let own = match &*law.node {
+        Node::Binary(op, ..) => matches!(
+            op,
+            Binary::Less
+                | Binary::LessEqual
+                | Binary::Greater
+                | Binary::GreaterEqual
+                | Binary::Equal
+                | Binary::NotEqual
+        ),
+        Node::Call(function, _) => matches!(function, Function::Floor | Function::Mod),
+        _ => false,
+    };
+    if own && !law.span.is_none() {
+        return Some(law.span);
+    }
+    match &*law.node {
+        Node::Number(_) | Node::Leaf(_) => None,
+        Node::Unary(_, a) | Node::Table(a, _) => condition(a),
+        Node::Binary(_, a, b) => condition(a).or_else(|| condition(b)),
+        Node::Call(_, arguments) => arguments.iter().find_map(condition),
+        Node::If(c, a, b) => condition(c).or_else(|| condition(a)).or_else(|| condition(b)),
     }
 }
 
