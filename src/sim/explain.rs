@@ -49,6 +49,7 @@ pub(crate) enum Moment {
     Start,
     Restart,
     Step,
+    Row,
 }
 
 impl Moment {
@@ -58,6 +59,7 @@ impl Moment {
             Moment::Start => "no consistent values were found at the start",
             Moment::Restart => "no consistent values were found after a corner or event",
             Moment::Step => "the step became too small",
+            Moment::Row => "there are no values for a row",
         }
     }
 }

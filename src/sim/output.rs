@@ -1,18 +1,41 @@
 //! Rows of the trace: when they are due, and their values from the charges of a step.
 //!
 //! Only charges are interpolated; the unknowns follow from the frozen network, so that algebraic relations hold in each
-//! row. No step is ever cut for a row.
+//! row. No step is ever cut for a row. Where the circuit is of index 2, charges say too little: there a shorter step of
+//! TR-BDF2 leads from the step's start to the row.
 
-use super::methods::Work;
+use super::methods::{Work, trbdf2};
 use super::network::Network;
-use super::newton::{Frozen, correct_frozen};
+use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
 use super::settings::{Interval, Settings};
 use crate::trace::Sink;
 use std::io;
 
-/// Most pieces that a step is cut into for straight lines.
-const MOST_PIECES: f64 = 256.0;
+/// How often a step is halved for straight lines at most.
+const MOST_HALVED: u32 = 8;
+
+/// What rounding may make of a column, as a part of its magnitude.
+const ROUNDING: f64 = 1e-12;
+
+/// Within this part of a step of index 2 a row lies on the straight line: a step so short would have only rounding in
+/// its rates.
+const SHORT: f64 = 1e-6;
+
+/// Why rows ended.
+#[derive(Debug)]
+pub(crate) enum Stopped {
+    /// The sink takes no more.
+    Write(io::Error),
+    /// There are no values at this time.
+    Values(f64, Cut),
+}
+
+impl From<io::Error> for Stopped {
+    fn from(error: io::Error) -> Stopped {
+        Stopped::Write(error)
+    }
+}
 
 /// Where rows go, and which are still to come.
 pub(crate) struct Rows<'a> {
@@ -23,6 +46,8 @@ pub(crate) struct Rows<'a> {
     /// Times closer than this are the same.
     slack: f64,
     reltol: f64,
+    /// Differences that mean nothing in any column.
+    least: f64,
     /// The next row of a grid or list.
     next: usize,
     /// Time and values of the row being made.
@@ -31,8 +56,6 @@ pub(crate) struct Rows<'a> {
     left: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
-    /// Values on a line, while a step is looked at.
-    probe: Vec<f64>,
     point: State,
     /// Charges that are states.
     held: Vec<bool>,
@@ -51,12 +74,12 @@ impl<'a> Rows<'a> {
             stop: settings.stop,
             slack: 1e-12 * settings.stop,
             reltol: settings.reltol,
+            least: 1e-2 * settings.abstol,
             next: 0,
             row: vec![0.0; columns + 1],
             left: vec![0.0; columns + 1],
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
-            probe: vec![0.0; columns],
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
             factorised: None,
@@ -98,7 +121,7 @@ impl<'a> Rows<'a> {
         index2: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> io::Result<()> {
+    ) -> Result<(), Stopped> {
         loop {
             let due = self.next_time();
             if due > time + self.slack {
@@ -106,7 +129,7 @@ impl<'a> Rows<'a> {
             }
             self.next += 1;
             self.point.copy_from(state);
-            self.finish_point(network, due, index2 || !network.system.output_rates, weights, work);
+            self.finish_point(network, due, index2 || !network.system.output_rates, weights, work)?;
             self.write(network, due)?;
         }
     }
@@ -120,7 +143,7 @@ impl<'a> Rows<'a> {
         index2: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> io::Result<()> {
+    ) -> Result<(), Stopped> {
         self.factorised = None;
         loop {
             let due = self.next_time();
@@ -128,7 +151,7 @@ impl<'a> Rows<'a> {
                 return Ok(());
             }
             self.next += 1;
-            self.between(network, from, to, due, index2, weights, work);
+            self.between(network, from, to, due, index2, weights, work)?;
             self.write(network, due)?;
         }
     }
@@ -147,19 +170,16 @@ impl<'a> Rows<'a> {
         index2: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> io::Result<()> {
+    ) -> Result<(), Stopped> {
         self.factorised = None;
         self.point.copy_from(state);
-        self.finish_point(network, state.t, index2 || !network.system.output_rates, weights, work);
+        self.finish_point(network, state.t, index2 || !network.system.output_rates, weights, work)?;
         self.point.t = state.t;
         self.evaluate(network, time);
         if time >= self.start - self.slack {
             self.send(network)?;
         }
-        for (c, value) in self.row[1..].iter().enumerate() {
-            self.low[c] = self.low[c].min(*value);
-            self.high[c] = self.high[c].max(*value);
-        }
+        self.widen();
         self.left.copy_from_slice(&self.row);
         Ok(())
     }
@@ -173,45 +193,71 @@ impl<'a> Rows<'a> {
         index2: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> io::Result<()> {
+    ) -> Result<(), Stopped> {
         self.factorised = None;
         if to.t < self.start {
             return Ok(());
         }
-        let columns = self.probe.len();
-        network.outputs(&to.x, &to.w, to.t, &mut self.probe);
-        for (c, value) in self.probe.iter().enumerate() {
+        self.point.copy_from(to);
+        self.finish_point(network, to.t, index2 || !network.system.output_rates, weights, work)?;
+        self.evaluate(network, to.t);
+        self.widen();
+        // Pieces are halved from the left; what is still to come lies on a pile: its right end, how often it has been
+        // halved, and how far its double was from a line.
+        let mut left = std::mem::take(&mut self.left);
+        left[0] = from.t;
+        let mut pile = vec![(self.row.clone(), 0, f64::INFINITY)];
+        while let Some((right, halved, before)) = pile.pop() {
+            let span = right[0] - left[0];
+            let mut off = 0.0;
+            if halved < MOST_HALVED && span > self.slack {
+                // A curve that swings about its line may cross it in the middle.
+                let thetas: &[f64] = if halved < 2 { &[0.3, 0.5] } else { &[0.5] };
+                for theta in thetas {
+                    let time = left[0] + theta * span;
+                    self.between(network, from, to, time, index2, weights, work)?;
+                    self.evaluate(network, time);
+                    self.widen();
+                    off = self.off_line(*theta, &left, &right).max(off);
+                }
+            }
+            // What does not become straighter is rounding.
+            let straight = off <= 1.0 || (halved > 4 && off >= before);
+            if !straight {
+                let middle = self.row.clone();
+                pile.push((right, halved + 1, off));
+                pile.push((middle, halved + 1, off));
+                continue;
+            }
+            left.copy_from_slice(&right);
+            if !pile.is_empty() && left[0] >= self.start - self.slack {
+                self.row.copy_from_slice(&left);
+                self.send(network)?;
+            }
+        }
+        self.left = left;
+        Ok(())
+    }
+
+    /// Takes the present row into the extremes.
+    fn widen(&mut self) {
+        for (c, value) in self.row[1..].iter().enumerate() {
             self.low[c] = self.low[c].min(*value);
             self.high[c] = self.high[c].max(*value);
         }
-        let mut bend: f64 = 0.0;
-        for theta in [0.25, 0.5, 0.75] {
-            work.dense.unknowns(theta, from, to, &mut self.point.x);
-            let t = from.t + theta * (to.t - from.t);
-            for (k, w) in self.point.w.iter_mut().enumerate() {
-                *w = from.w[k] + theta * (to.w[k] - from.w[k]);
-            }
-            network.outputs(&self.point.x, &self.point.w, t, &mut self.row[1..]);
-            for c in 0..columns {
-                let line = self.left[c + 1] + theta * (self.probe[c] - self.left[c + 1]);
-                let range = self.high[c] - self.low[c];
-                let off = (self.row[c + 1] - line).abs();
-                if off > self.reltol * range && range > 0.0 {
-                    bend = bend.max(off / (self.reltol * range));
-                }
-            }
+    }
+
+    /// How far the present row is from the line between two others, in units of what is allowed.
+    fn off_line(&self, theta: f64, left: &[f64], right: &[f64]) -> f64 {
+        let mut most: f64 = 0.0;
+        for c in 0..self.low.len() {
+            let (a, b) = (left[c + 1], right[c + 1]);
+            let off = (self.row[c + 1] - (a + theta * (b - a))).abs();
+            let (low, high) = (self.low[c], self.high[c]);
+            let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
+            most = most.max(off / (self.reltol * (high - low)).max(rounding));
         }
-        let pieces = bend.sqrt().ceil().min(MOST_PIECES);
-        let mut piece = 1.0;
-        while piece < pieces {
-            let time = from.t + piece / pieces * (to.t - from.t);
-            if time >= self.start - self.slack && time < to.t {
-                self.between(network, from, to, time, index2, weights, work);
-                self.write(network, time)?;
-            }
-            piece += 1.0;
-        }
-        Ok(())
+        most
     }
 
     /// Puts the values at a time inside a step into `self.point`.
@@ -225,14 +271,46 @@ impl<'a> Rows<'a> {
         index2: bool,
         weights: &[f64],
         work: &mut Work,
-    ) {
+    ) -> Result<(), Stopped> {
         let theta = (time - from.t) / (to.t - from.t);
+        if index2 {
+            return self.shorter_step(network, from, to, time, weights, work);
+        }
         work.dense.unknowns(theta, from, to, &mut self.point.x);
         work.dense.charges(theta, from, to, &mut self.point.q);
         for (k, w) in self.point.w.iter_mut().enumerate() {
             *w = from.w[k] + theta * (to.w[k] - from.w[k]);
         }
-        self.finish_point(network, time, index2, weights, work);
+        self.finish_point(network, time, false, weights, work)
+    }
+
+    /// The same by a step of its own, so that algebraic relations between charges and rates hold.
+    fn shorter_step(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        time: f64,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<(), Stopped> {
+        let theta = (time - from.t) / (to.t - from.t);
+        self.point.t = time;
+        if theta < SHORT {
+            let line = |out: &mut [f64], from: &[f64], to: &[f64]| {
+                for (out, (from, to)) in out.iter_mut().zip(from.iter().zip(to)) {
+                    *out = from + theta * (to - from);
+                }
+            };
+            line(&mut self.point.x, &from.x, &to.x);
+            line(&mut self.point.q, &from.q, &to.q);
+            line(&mut self.point.w, &from.w, &to.w);
+            return Ok(());
+        }
+        match trbdf2::step(network, from, &mut self.point, weights, work) {
+            Ok(_) => Ok(()),
+            Err(cut) => Err(Stopped::Values(time, cut)),
+        }
     }
 
     /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`.
@@ -243,22 +321,23 @@ impl<'a> Rows<'a> {
         as_is: bool,
         weights: &[f64],
         work: &mut Work,
-    ) {
+    ) -> Result<(), Stopped> {
         self.point.t = time;
         if as_is {
-            return;
+            return Ok(());
         }
         work.x.copy_from_slice(&self.point.x);
         work.w.copy_from_slice(&self.point.w);
         let targets = std::mem::take(&mut self.point.q);
         let corrected = self.correct(network, &targets, time, weights, work);
         self.point.q = targets;
-        if corrected {
+        if corrected.map_err(|cut| Stopped::Values(time, cut))? {
             self.point.x.copy_from_slice(&work.x);
             self.point.w.copy_from_slice(&work.w);
         }
+        Ok(())
     }
-
+    /// Whether the correction came to its end; an error where there are no finite values.
     fn correct(
         &mut self,
         network: &mut Network,
@@ -266,7 +345,7 @@ impl<'a> Rows<'a> {
         time: f64,
         weights: &[f64],
         work: &mut Work,
-    ) -> bool {
+    ) -> Result<bool, Cut> {
         let Work { x, w, q, scratch, .. } = work;
         let held = &self.held;
         let frozen = Frozen { t: time, held, targets, floors: weights, most: 1, prime: false };
@@ -277,22 +356,32 @@ impl<'a> Rows<'a> {
             if self.factorised != Some(true) || iteration >= 2 {
                 // The slopes of the step's start no longer serve.
                 network.linearise(x, time, false);
-                self.factorised = Some(network.factorise_frozen(held).is_ok());
-                if self.factorised == Some(false) {
+                if network.factorise_frozen(held).is_err() {
                     self.factorised = None;
-                    return false;
+                    return self.keep_guess(network, time, work);
                 }
+                self.factorised = Some(true);
             }
             let update = correct_frozen(network, &frozen, x, w, q, scratch);
             if update <= 0.02 || (iteration == 0 && network.system.is_linear()) {
-                return true;
+                return Ok(true);
             }
             if !update.is_finite() {
                 break;
             }
         }
         self.factorised = None;
-        false
+        self.keep_guess(network, time, work)
+    }
+
+    /// The corrections may have led astray: what was interpolated stands, where the laws have values there.
+    fn keep_guess(&self, network: &mut Network, time: f64, work: &mut Work) -> Result<bool, Cut> {
+        network.evaluate(&self.point.x, time);
+        network.residual(&self.point.x, time, &mut work.right);
+        if work.right.iter().all(|r| r.is_finite()) {
+            return Ok(false);
+        }
+        Err(Cut::NonFinite { device: network.non_finite_law() })
     }
 
     fn evaluate(&mut self, network: &mut Network, time: f64) {
@@ -300,17 +389,21 @@ impl<'a> Rows<'a> {
         network.outputs(&self.point.x, &self.point.w, self.point.t, &mut self.row[1..]);
     }
 
-    fn write(&mut self, network: &mut Network, time: f64) -> io::Result<()> {
+    fn write(&mut self, network: &mut Network, time: f64) -> Result<(), Stopped> {
         self.evaluate(network, time);
         self.send(network)
     }
 
-    fn send(&mut self, network: &mut Network) -> io::Result<()> {
+    fn send(&mut self, network: &mut Network) -> Result<(), Stopped> {
         network.statistics.rows += 1;
         for value in &mut self.row {
             // −0 becomes 0.
             *value += 0.0;
         }
-        self.sink.row(&self.row)
+        if self.row.iter().any(|value| !value.is_finite()) {
+            let device = network.non_finite_law();
+            return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
+        }
+        Ok(self.sink.row(&self.row)?)
     }
 }

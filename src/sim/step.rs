@@ -9,10 +9,11 @@ use super::methods::{self, Method, Work};
 use super::network::Network;
 use super::newton::{Cut, Stage, solve_stage};
 use super::op::{self, State, Trouble};
-use super::output::Rows;
+use super::output::{Rows, Stopped};
 use super::settings::{Settings, Tolerance};
 use super::statistics::Statistics;
 use super::system::System;
+use crate::circuit::Waveform;
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
 use crate::trace::Sink;
@@ -109,6 +110,25 @@ const PILOT_STEPS: u64 = 1000;
 /// in it counts as a jump.
 const LAYER: f64 = 1e-9;
 
+/// No step is longer than this part of a source's period. Where the circuit is of index 2, currents are rates of what
+/// the sources prescribe, and no error test sees them.
+const SIGHT: f64 = 0.25;
+const INDEX_2_SIGHT: f64 = 0.02;
+
+/// The highest frequency that a source swings with after a moment; 0 where it does not.
+fn swings(waveform: &Waveform, t: f64) -> f64 {
+    let frequency = match waveform {
+        Waveform::Sine { amplitude, frequency, delay, .. } if *amplitude != 0.0 && t >= *delay => {
+            frequency.abs()
+        }
+        Waveform::Sffm { amplitude, carrier, index, signal, .. } if *amplitude != 0.0 => {
+            carrier.abs() + (index * signal).abs()
+        }
+        _ => 0.0,
+    };
+    if frequency.is_finite() { frequency } else { 0.0 }
+}
+
 struct Run<'a> {
     network: Network<'a>,
     settings: &'a Settings,
@@ -126,6 +146,8 @@ struct Run<'a> {
     next: State,
     work: Work,
     controls: Controls,
+    /// The longest step that sources let nothing be jumped over in.
+    sight: f64,
     /// The step to try next, the smallest that time can resolve.
     h: f64,
     smallest: f64,
@@ -174,6 +196,7 @@ impl<'a> Run<'a> {
             next: State::new(0.0, n, charges),
             work: Work::new(n, charges),
             controls: Controls::new(system.modes.len()),
+            sight: f64::INFINITY,
             h: settings.stop,
             smallest: 8.0 * f64::EPSILON * settings.stop,
             last: None,
@@ -284,9 +307,18 @@ impl<'a> Run<'a> {
             }
         }
         self.weigh();
+        self.look_ahead();
         let Run { network, state, controls, .. } = self;
         network.controls(&state.x, state.t, &mut controls.left);
         Ok(())
+    }
+
+    /// Sets the longest step by the periods of the sources that swing.
+    fn look_ahead(&mut self) {
+        let part = if self.index2 { INDEX_2_SIGHT } else { SIGHT };
+        let sources = self.network.system.sources.iter();
+        let fastest = sources.map(|source| swings(&source.waveform, self.state.t));
+        self.sight = part / fastest.fold(0.0, f64::max);
     }
 
     /// Three short steps of the backward Euler method: the first lets charges jump to where loops of capacitors and
@@ -374,8 +406,8 @@ impl<'a> Run<'a> {
     fn advance(&mut self) -> Result<(bool, Option<usize>), Failure> {
         let corner = self.network.next_corner().min(self.settings.stop);
         let remaining = corner - self.state.t;
-        let power = self.method.error_power();
-        let limit = self.settings.hmax.unwrap_or(f64::INFINITY);
+        let mut power = self.method.error_power();
+        let limit = self.settings.hmax.unwrap_or(f64::INFINITY).min(self.sight);
         let planned = self.h.min(limit);
         let mut h = planned;
         let mut bounded = false;
@@ -413,6 +445,15 @@ impl<'a> Run<'a> {
                     h *= (0.9 * libm::pow(error, -1.0 / power)).clamp(0.1, 0.9);
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
+                Err(Cut::NonFinite { .. }) if self.slope_by_time_is_infinite() => {
+                    self.method = Method::TrBdf2;
+                    power = self.method.error_power();
+                    let statistics = &mut self.network.statistics;
+                    statistics.rejected.non_finite += 1;
+                    statistics.method = self.method.name().into();
+                    statistics.reason = "a slope by time is infinite".into();
+                    continue;
+                }
                 Err(cut) => {
                     let rejected = &mut self.network.statistics.rejected;
                     match &cut {
@@ -449,6 +490,12 @@ impl<'a> Run<'a> {
                 ));
             }
         }
+    }
+
+    /// Whether a Rosenbrock method stands where a law's derivative by time is infinite.
+    fn slope_by_time_is_infinite(&self) -> bool {
+        matches!(self.method, Method::Rodas4 | Method::Rodas5p)
+            && self.work.slopes.iter().any(|slope| !slope.is_finite())
     }
 
     fn worst_error(&self) -> usize {
@@ -496,7 +543,7 @@ impl<'a> Run<'a> {
             } else {
                 rows.inside(network, state, next, *index2, weights, work)
             };
-            outcome.map_err(|error| self.write_failure(&error))?;
+            outcome.map_err(|stopped| self.row_failure(stopped))?;
         }
         self.work.remember(&self.state);
         self.work.linearised = false;
@@ -551,6 +598,17 @@ impl<'a> Run<'a> {
         })
     }
 
+    fn row_failure(&self, stopped: Stopped) -> Failure {
+        match stopped {
+            Stopped::Write(error) => self.write_failure(&error),
+            Stopped::Values(time, cut) => {
+                let network = &self.network;
+                let trouble = Trouble::Cut(cut);
+                failure(network.system, Moment::Row, time, &trouble, &network.statistics)
+            }
+        }
+    }
+
     fn write_failure(&self, error: &io::Error) -> Failure {
         let message = format!("a row cannot be written: {error}");
         Failure {
@@ -575,7 +633,7 @@ impl<'a> Run<'a> {
         let Run { network, state, weights, work, index2, rows, .. } = self;
         let Some(rows) = rows.as_mut().filter(|rows| rows.follows_steps()) else { return Ok(()) };
         let outcome = rows.here(network, state, time, *index2, weights, work);
-        outcome.map_err(|error| self.write_failure(&error))
+        outcome.map_err(|stopped| self.row_failure(stopped))
     }
 
     /// The rows of a grid or list that are due now.
@@ -583,6 +641,6 @@ impl<'a> Run<'a> {
         let Run { network, state, weights, work, index2, rows, .. } = self;
         let Some(rows) = rows.as_mut() else { return Ok(()) };
         let outcome = rows.at(network, state, state.t, *index2, weights, work);
-        outcome.map_err(|error| self.write_failure(&error))
+        outcome.map_err(|stopped| self.row_failure(stopped))
     }
 }

@@ -647,3 +647,73 @@ fn an_interrupt_ends_the_run() {
     let failure = transient(&system, &settings, &mut trace(&system)).unwrap_err();
     assert_eq!(failure.kind, FailureKind::Interrupted);
 }
+
+#[test]
+fn rows_of_index_2_between_steps_are_those_of_shorter_steps() {
+    let system = system(vec![
+        ("V1", vec![1, 0], v(sine(2.0, 1.0))),
+        ("C1", vec![1, 0], c(1.0, 0.0)),
+        ("R1", vec![1, 0], r(1.0)),
+    ]);
+    let exact = |t: f64| 2.0 * (TAU * t).sin();
+    for settings in [grid(1.0, 0.01, 1e-6), Settings::new(1.0)] {
+        let (trace, statistics) = run(&system, &settings);
+        assert!(worst(&trace, "v(1)", exact) < 1e-9, "{statistics}");
+        let current = |t: f64| -(2.0 * TAU * (TAU * t).cos() + exact(t));
+        // The first value is an extrapolation.
+        assert!(worst(&trace, "i(v1)", current) < 3e-2, "{statistics}");
+    }
+}
+
+#[test]
+fn no_swing_of_a_source_is_jumped_over() {
+    let system = system(vec![("V1", vec![1, 0], v(sine(1.0, 1000.0))), ("R1", vec![1, 0], r(1.0))]);
+    for method in [Method::Auto, Method::TrBdf2, Method::Gear2, Method::Trapezoidal] {
+        let (_, statistics) = run(&system, &Settings { method, ..grid(1e-2, 1e-3, 1e-3) });
+        assert!(statistics.accepted >= 40, "{method:?}: {statistics}");
+    }
+}
+
+#[test]
+fn straight_lines_between_rows_are_within_tolerance() {
+    for frequency in [1000.0, 7000.0] {
+        let system =
+            system(vec![("V1", vec![1, 0], v(sine(1.0, frequency))), ("R1", vec![1, 0], r(1.0))]);
+        let settings = Settings { reltol: 1e-3, ..Settings::new(1e-2) };
+        let (trace, statistics) = run(&system, &settings);
+        let (times, values) = (&trace.columns[0], column(&trace, "v(1)"));
+        for (t, v) in times.windows(2).zip(values.windows(2)) {
+            for theta in [0.25, 0.5, 0.75] {
+                let line = v[0] + theta * (v[1] - v[0]);
+                let exact = (TAU * frequency * (t[0] + theta * (t[1] - t[0]))).sin();
+                assert!((line - exact).abs() < 2.1e-3, "{line} {exact} at {}: {statistics}", t[0]);
+            }
+        }
+        assert!(times.len() < 150 * 70, "{}", times.len());
+    }
+}
+
+#[test]
+fn a_row_without_a_finite_value_ends_the_run() {
+    let pole = plus(time(), Expr::number(-1.0));
+    let law = Expr::number(1.0).binary(Binary::Divide, pole);
+    let system = system(vec![
+        ("B1", vec![1, 0], DeviceKind::BehaviouralVoltage { law }),
+        ("R1", vec![1, 0], r(1.0)),
+    ]);
+    let failure = transient(&system, &grid(2.0, 0.5, 1e-6), &mut trace(&system)).unwrap_err();
+    assert_eq!(failure.diagnostic.code, "E0803", "{:?}", failure.diagnostic);
+    assert_eq!(failure.kind, FailureKind::NotSolved);
+    assert!((failure.time - 1.0).abs() < 1e-6, "{}", failure.time);
+}
+
+#[test]
+fn an_infinite_slope_by_time_is_no_obstacle() {
+    let system = system(vec![
+        ("B1", vec![1, 0], DeviceKind::BehaviouralVoltage { law: call(Function::Sqrt, time()) }),
+        ("R1", vec![1, 0], r(1.0)),
+    ]);
+    let (trace, statistics) = run(&system, &grid(1.0, 0.1, 1e-6));
+    assert_eq!(statistics.method, "trbdf2");
+    assert!(worst(&trace, "v(1)", f64::sqrt) < 1e-9, "{statistics}");
+}
