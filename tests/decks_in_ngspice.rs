@@ -20,6 +20,21 @@ Rg n 0 1meg
 .save v(o)
 ";
 
+const FLOATING_BRIDGE: &str = "\
+* diode bridge whose supply floats: what returns through ground is nothing but rounding
+V1 a b SIN(0 12 50)
+D1 a p dm
+D2 b p dm
+D3 n a dm
+D4 n b dm
+C1 p n 100u
+R1 p n 200
+Rg n 0 1
+.model dm D(IS=1e-12 N=1.5 RS=0.1 CJO=20p TT=10n)
+.options reltol=1e-5
+.save v(p)
+";
+
 const BUCK: &str = "\
 * buck converter with a switch and a diode
 Vin in 0 24
@@ -95,6 +110,11 @@ fn same(deck: &str, ours: &str, theirs: &str, tolerance: f64) {
 #[test]
 fn a_diode_bridge() {
     same(BRIDGE, ".tran 10u 40m", ".tran 10u 40m 0 2u", 1e-3);
+}
+
+#[test]
+fn a_diode_bridge_with_a_floating_supply() {
+    same(FLOATING_BRIDGE, ".tran 10u 40m", ".tran 10u 40m 0 2u", 1e-3);
 }
 
 #[test]

@@ -170,6 +170,13 @@ impl<'a> Run<'a> {
         let network = Network::new(system, 0.0);
         let (n, charges) = (system.equations(), system.charges());
         let rows = sink.map(|sink| Rows::new(&network, settings, sink));
+        // Below the rounding of the largest voltage or current an unknown that is really 0 is noise.
+        let noise = |voltage: bool| {
+            let of_kind = system.unknowns.iter().zip(magnitudes.unwrap_or(&[]));
+            let of_kind = of_kind.filter(|(unknown, _)| unknown.voltage == voltage);
+            64.0 * f64::EPSILON * of_kind.fold(0.0f64, |most, (_, size)| most.max(*size))
+        };
+        let noises = [noise(false), noise(true)];
         let absolute = system.unknowns.iter().enumerate().map(|(k, unknown)| {
             let literal = if unknown.voltage { settings.vntol } else { settings.abstol };
             match (settings.tolerance, unknown.nominal, magnitudes.map(|m| m[k])) {
@@ -178,7 +185,8 @@ impl<'a> Run<'a> {
                     settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
                 }
                 (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
-                    literal.min(1e-3 * settings.reltol * size)
+                    let noise = noises[usize::from(unknown.voltage)].min(literal);
+                    literal.min(1e-3 * settings.reltol * size).max(noise)
                 }
                 _ => literal,
             }
