@@ -178,3 +178,19 @@ fn the_report_has_the_agreed_form() {
     }
     assert!(report.text().contains("pass: both routes agree"), "{}", report.text());
 }
+
+#[test]
+fn a_balance_with_a_sum_that_is_no_number_does_not_hold() {
+    let balance = bondspice::verify::EnergyReport {
+        delivered: 1.0,
+        stored: 0.5,
+        dissipated: 0.5,
+        modulated: 0.0,
+        residual: 0.0,
+        tolerance: 1e-6,
+        junctions: 0.0,
+        elements: vec![],
+    };
+    assert!(balance.holds());
+    assert!(!bondspice::verify::EnergyReport { stored: f64::NAN, ..balance }.holds());
+}

@@ -173,7 +173,11 @@ impl EnergyReport {
 
     /// Whether the balance closes.
     pub fn holds(&self) -> bool {
-        self.residual.abs() <= self.tolerance && self.junctions <= JUNCTIONS
+        // A sum that is no number is no balance, whatever the residual says.
+        let sums = [self.delivered, self.stored, self.dissipated, self.modulated];
+        sums.iter().all(|sum| sum.is_finite())
+            && self.residual.abs() <= self.tolerance
+            && self.junctions <= JUNCTIONS
     }
 }
 
