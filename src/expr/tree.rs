@@ -72,6 +72,14 @@ pub struct Table {
 /// What puts a tree in the place of each leaf.
 pub type LeafMap<'a, L, M, E> = &'a mut dyn FnMut(&L, Span) -> Result<Expr<M>, E>;
 
+impl Binary {
+    /// Whether it compares: its value jumps between 0 and 1.
+    pub fn is_comparison(self) -> bool {
+        use Binary::*;
+        matches!(self, Less | LessEqual | Greater | GreaterEqual | Equal | NotEqual)
+    }
+}
+
 impl<L> Expr<L> {
     /// A node at a place.
     pub fn new(node: Node<L>, span: Span) -> Expr<L> {

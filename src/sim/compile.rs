@@ -7,7 +7,7 @@ use super::system::{LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System,
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Binary, Dag, Function, Node, NodeId};
+use crate::expr::{Dag, Function, Node, NodeId};
 use crate::linear::{Lu, Pattern};
 use crate::source::Span;
 use std::collections::BTreeMap;
@@ -66,15 +66,7 @@ fn warn_of_jumps(stamps: &Stamps, d: &mut Vec<Diagnostic>) {
 /// The first comparison, `floor` or `mod` of a law that stands in a text.
 fn condition(law: &Law) -> Option<Span> {
     let own = match &*law.node {
-        Node::Binary(op, ..) => matches!(
-            op,
-            Binary::Less
-                | Binary::LessEqual
-                | Binary::Greater
-                | Binary::GreaterEqual
-                | Binary::Equal
-                | Binary::NotEqual
-        ),
+        Node::Binary(op, ..) => op.is_comparison(),
         Node::Call(function, _) => matches!(function, Function::Floor | Function::Mod),
         _ => false,
     };

@@ -396,15 +396,7 @@ impl Equations {
     /// Comparisons and floors over time alone jump at times that can be known beforehand.
     fn held(&mut self, graph: &BondGraph, expr: &Expr) -> Option<Formula> {
         let jumps = match &*expr.node {
-            Node::Binary(op, ..) => matches!(
-                op,
-                Binary::Less
-                    | Binary::LessEqual
-                    | Binary::Greater
-                    | Binary::GreaterEqual
-                    | Binary::Equal
-                    | Binary::NotEqual
-            ),
+            Node::Binary(op, ..) => op.is_comparison(),
             Node::Call(function, _) => matches!(function, Function::Floor | Function::Sign),
             _ => false,
         };
