@@ -135,6 +135,7 @@ impl Scope<'_> {
             Node::Leaf(syntax::Leaf::Quantity(_, unit)) => Dim::Known(unit.dimension),
             Node::Leaf(syntax::Leaf::Name(path)) => self.name_dimension(path, own),
             Node::Leaf(syntax::Leaf::Call(call)) => self.call_dimension(call, own),
+            Node::Leaf(syntax::Leaf::Sum(sum)) => dim(&sum.term),
             Node::Unary(Unary::Negate, a) => dim(a),
             Node::Unary(Unary::Not, _) => Dim::Known(Dimension::NONE),
             Node::Binary(op, a, b) => match op {

@@ -3,7 +3,7 @@
 use crate::bond::elements::{ELEMENTS, Element, element};
 use crate::bond::graph::*;
 use crate::bond::syntax::{
-    Argument, Chain, ChainEnd, Expr as Syntax, File, Name, ObserveItem, Path, StatementKind,
+    Argument, Chain, ChainEnd, Expr as Syntax, File, Name, ObserveItem, Part, Path, StatementKind,
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::Expr as Tree;
@@ -23,7 +23,7 @@ pub(super) enum Meaning {
 pub(super) struct Declaration<'a> {
     pub element: &'static Element,
     pub arguments: Option<&'a [Argument]>,
-    pub name: &'a Name,
+    pub name: &'a Part,
     /// What stands in the file for it: kind, name and arguments.
     pub span: Span,
     /// Index of its statement.
@@ -49,8 +49,8 @@ pub(super) struct Scope<'a> {
     pub signals: Vec<Option<Valued<'a>>>,
     /// Statement and rank within it, by signal: hidden ones come before the signal that they belong to.
     pub signal_order: Vec<(usize, usize)>,
-    pub outputs: Vec<&'a Name>,
-    pub drives: Vec<(&'a Name, Valued<'a>)>,
+    pub outputs: Vec<&'a Part>,
+    pub drives: Vec<(&'a Part, Valued<'a>)>,
     pub simulate: Vec<(&'a Option<Syntax>, &'a Option<Syntax>, Span)>,
     pub options: Vec<&'a (Name, Name)>,
     pub observe: Vec<&'a ObserveItem>,
@@ -116,6 +116,13 @@ impl<'a> Scope<'a> {
                 }
                 StatementKind::Options(options) => scope.options.extend(options),
                 StatementKind::Observe(items) => scope.observe.extend(items),
+                // Of hierarchy; the parser does not make them yet.
+                StatementKind::Import(_)
+                | StatementKind::Model(_)
+                | StatementKind::Port(_)
+                | StatementKind::For { .. }
+                | StatementKind::If { .. }
+                | StatementKind::Loop(_) => {}
                 StatementKind::Unreadable => {
                     let text = map.text(item.span);
                     let parts = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
@@ -198,7 +205,7 @@ impl<'a> Scope<'a> {
 
     fn declare_parameter(
         &mut self,
-        name: &'a Name,
+        name: &'a Part,
         value: &'a Syntax,
         description: Option<&Name>,
         statement: usize,
@@ -221,7 +228,7 @@ impl<'a> Scope<'a> {
 
     fn declare_signal(
         &mut self,
-        name: &'a Name,
+        name: &'a Part,
         origin: SignalOrigin,
         valued: Option<Valued<'a>>,
         statement: usize,
@@ -243,7 +250,7 @@ impl<'a> Scope<'a> {
     }
 
     /// Takes a name into the space of values, unless it is taken or reserved.
-    fn declare_value(&mut self, name: &'a Name, meaning: Meaning, d: &mut Vec<Diagnostic>) -> bool {
+    fn declare_value(&mut self, name: &'a Part, meaning: Meaning, d: &mut Vec<Diagnostic>) -> bool {
         if RESERVED.contains(&name.text.as_str()) {
             self.excused.insert(&name.text);
             let means = match name.text.as_str() {
@@ -331,7 +338,7 @@ pub(super) fn did_you_mean(error: Diagnostic, span: Span, meant: &str) -> Diagno
     error.fix(format!("write `{meant}`"), vec![(span, meant.to_string())])
 }
 
-fn unknown_kind(kind: &Name, name: &Name) -> Diagnostic {
+fn unknown_kind(kind: &Name, name: &Part) -> Diagnostic {
     let text = kind.text.as_str();
     if text == "IC" || text == "MIC" {
         return Diagnostic::error("E0201", kind.span, "fields are not part of the language yet")

@@ -4,7 +4,7 @@ use super::call::{DYNAMICS, Signature, WAVEFORMS, signature};
 use super::scope::{Meaning, Scope, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
-use crate::bond::syntax::{self, Call, Name, Value, parse_drive};
+use crate::bond::syntax::{self, Call, Part, Value, parse_drive};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Function, Node};
 use crate::quantity::nearest;
@@ -309,7 +309,7 @@ impl Scope<'_> {
     }
 
     /// The input of a name.
-    fn input(&self, name: &Name, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
+    fn input(&self, name: &Part, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
         let text = name.text.as_str();
         let inputs = || self.graph.signals.iter().filter(|s| s.origin == SignalOrigin::Input);
         match self.values.get(text) {

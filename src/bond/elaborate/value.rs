@@ -81,6 +81,8 @@ impl Scope<'_> {
             syntax::Leaf::Quantity(value, _) => Some(Tree::new(Node::Number(*value), span)),
             syntax::Leaf::Name(path) => self.name(path, place, d),
             syntax::Leaf::Call(call) => self.call(call, span, place, d),
+            // The parser does not make it yet.
+            syntax::Leaf::Sum(_) => None,
         }
     }
 

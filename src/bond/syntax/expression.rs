@@ -1,7 +1,7 @@
 //! Expressions of `.bg` files: what the shared grammar leaves to the language.
 
 use super::scan::UNIT_MARK;
-use super::tree::{Argument, Call, Expr, Label, Leaf, Name, Path, Value};
+use super::tree::{Argument, Call, Expr, Label, Leaf, Name, Part, Path, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{Dialect, Node};
@@ -51,11 +51,11 @@ impl Reader<'_> {
         let mut start = span.start as usize;
         let mut parts = self.source(span).split('.').map(|part| {
             let end = start + part.len();
-            let name = Name { text: part.to_string(), span: Span::new(self.file, start, end) };
+            let span = Span::new(self.file, start, end);
             start = end + 1;
-            name
+            Part { text: part.to_string(), indices: vec![], span }
         });
-        let name = parts.next().unwrap_or(Name { text: String::new(), span });
+        let name = parts.next().unwrap_or(Part { text: String::new(), indices: vec![], span });
         Path { name, members: parts.collect(), span }
     }
 

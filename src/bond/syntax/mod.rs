@@ -12,8 +12,9 @@ mod expected;
 pub use parse::{parse, parse_drive, parse_observe, parse_value};
 pub use scan::STATEMENT_WORDS;
 pub use tree::{
-    Argument, Arrow, Call, Chain, ChainEnd, Expr, File, Label, Leaf, Name, ObserveItem, Path,
-    Statement, StatementKind, Trivia, TriviaKind, Value,
+    Argument, Arrow, Call, Chain, ChainEnd, Expr, File, HeaderParameter, Label, Leaf, Model, Name,
+    ObserveItem, Part, Path, Port, Regulator, Statement, StatementKind, Sum, Trivia, TriviaKind,
+    Value,
 };
 
 #[cfg(test)]

@@ -54,11 +54,11 @@ pub fn parse_value(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<
 }
 
 /// Reads what an input gets: `x_ref = step(0.1 s, 0 mm, 20 mm)`.
-pub fn parse_drive(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<(Name, Expr)> {
+pub fn parse_drive(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<(Part, Expr)> {
     alone(text, file, Rule::drive_alone, d, |reader, mut pairs, d| {
         let name = reader.name(&pairs.next()?);
         let value = pairs.find(|pair| pair.as_rule() == Rule::expression)?;
-        Some((name, parse::expression(reader, value, d)?))
+        Some((Part::from(name), parse::expression(reader, value, d)?))
     })
 }
 
@@ -165,7 +165,7 @@ fn statement(
     }
     for pair in pairs {
         match pair.as_rule() {
-            Rule::name => names.push(reader.name(&pair)),
+            Rule::name => names.push(Part::from(reader.name(&pair))),
             Rule::expression => values.push(parse::expression(reader, pair, d)?),
             Rule::text => description = Some(reader.text(&pair)),
             _ => {}

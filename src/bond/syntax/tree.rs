@@ -53,7 +53,7 @@ pub enum StatementKind {
     /// `param L = 1.2 mH "armature inductance"`
     Parameter {
         /// Its name.
-        name: Name,
+        name: Part,
         /// Its value.
         value: Expr,
         /// The text in quotes, without them.
@@ -62,18 +62,18 @@ pub enum StatementKind {
     /// `signal x = integ(f(rod))`
     Signal {
         /// Its name.
-        name: Name,
+        name: Part,
         /// What it is.
         value: Expr,
     },
     /// `input x_ref`
-    Input(Vec<Name>),
+    Input(Vec<Part>),
     /// `output x`
-    Output(Vec<Name>),
+    Output(Vec<Part>),
     /// `drive x_ref = step(0.1 s, 0 mm, 20 mm)`
     Drive {
         /// The input.
-        name: Name,
+        name: Part,
         /// What it gets.
         value: Expr,
     },
@@ -88,8 +88,80 @@ pub enum StatementKind {
     Options(Vec<(Name, Name)>),
     /// `observe x in mm, e(pump_port) in bar as "pump pressure"`
     Observe(Vec<ObserveItem>),
+    /// `import "eha.bg"`: the text in quotes, without them.
+    Import(Name),
+    /// `model DcMotor(L = 1.2 mH, Jmp) { … }`
+    Model(Model),
+    /// `port in supply : electrical`
+    Port(Port),
+    /// `for k in 1..N { … }`
+    For {
+        /// What counts.
+        variable: Name,
+        /// From and to, both included.
+        range: (Expr, Expr),
+        /// What stands between the braces.
+        body: Vec<Statement>,
+    },
+    /// `if k > 1 { … } else { … }`, decided while the graph is built.
+    If {
+        /// Over parameters and loop variables.
+        condition: Expr,
+        /// When it is not 0.
+        then: Vec<Statement>,
+        /// When it is 0.
+        otherwise: Vec<Statement>,
+    },
+    /// `loop alpha: f(armature) follows I_ref, bandwidth 2000 rad/s, margin 60 deg`
+    Loop(Regulator),
     /// Could not be read; the error has been reported.
     Unreadable,
+}
+
+/// A model: a kind of one's own.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// What stands before the colon of an instance.
+    pub name: Name,
+    /// Its public parameters.
+    pub parameters: Vec<HeaderParameter>,
+    /// What stands between the braces.
+    pub body: Vec<Statement>,
+}
+
+/// A parameter in the header of a model: `L = 1.2 mH`, or `Jmp` alone, which each instance must give.
+#[derive(Clone, Debug)]
+pub struct HeaderParameter {
+    /// Its name.
+    pub name: Name,
+    /// What it is when an instance does not say.
+    pub default: Option<Expr>,
+}
+
+/// A port of a model.
+#[derive(Clone, Debug)]
+pub struct Port {
+    /// Whether its half arrow points into the model.
+    pub into: bool,
+    /// Its name; an index makes it one of several.
+    pub name: Part,
+    /// Its domain.
+    pub domain: Option<Name>,
+}
+
+/// A regulator and what it is for, as `bondspice tune` needs to know it.
+#[derive(Clone, Debug)]
+pub struct Regulator {
+    /// The signal made with `pi` or `pid`.
+    pub signal: Path,
+    /// What it controls.
+    pub controlled: Expr,
+    /// What that shall follow.
+    pub reference: Expr,
+    /// The bandwidth wanted.
+    pub bandwidth: Option<Expr>,
+    /// The phase margin wanted.
+    pub margin: Option<Expr>,
 }
 
 /// A name or another word and its place.
@@ -101,22 +173,44 @@ pub struct Name {
     pub span: Span,
 }
 
-/// `rod`, `t.1`, `motor.rotor`.
+/// `rod`, `t.1`, `motor.rotor`, `eha[k].supply`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     /// The first name.
-    pub name: Name,
+    pub name: Part,
     /// What follows after dots: names or numbers.
-    pub members: Vec<Name>,
+    pub members: Vec<Part>,
     /// All of it.
     pub span: Span,
 }
 
+/// A name of a path, and what stands after it in square brackets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// As written.
+    pub text: String,
+    /// The indices; empty when there are none.
+    pub indices: Vec<Expr>,
+    /// Where the name stands, without its indices.
+    pub span: Span,
+}
+
+impl From<Name> for Part {
+    fn from(name: Name) -> Part {
+        Part { text: name.text, indices: vec![], span: name.span }
+    }
+}
+
 impl Path {
-    /// As written, without blanks.
+    /// The first name and those after dots.
+    pub fn parts(&self) -> impl Iterator<Item = &Part> {
+        std::iter::once(&self.name).chain(&self.members)
+    }
+
+    /// The names joined by dots, without indices.
     pub fn text(&self) -> String {
-        let members = self.members.iter().flat_map(|member| [".", member.text.as_str()]);
-        std::iter::once(self.name.text.as_str()).chain(members).collect()
+        let parts: Vec<&str> = self.parts().map(|part| part.text.as_str()).collect();
+        parts.join(".")
     }
 }
 
@@ -211,6 +305,19 @@ pub enum Leaf {
     Name(Path),
     /// A call of anything but the functions of the table: a reading, a waveform, a dynamic function.
     Call(Call),
+    /// `sum(k in 1..N, x[k])`
+    Sum(Sum),
+}
+
+/// A sum over an index.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sum {
+    /// What counts.
+    pub variable: Name,
+    /// From and to, both included.
+    pub range: (Expr, Expr),
+    /// What is added up.
+    pub term: Expr,
 }
 
 /// `e(rod)`, `f(a -> b)[2]`, `pwl(0, 1; 2, 3)`, `pi(x, Kp = 1)`.
