@@ -4,6 +4,7 @@
 
 pub mod codes;
 pub mod files;
+pub mod gallery;
 pub mod render;
 
 use crate::source::Span;
