@@ -44,7 +44,7 @@ pub const CODES: &[Code] = &[
     row("E0108", "nothing is written", "A value is needed where nothing stands."),
     row("E0109", "list within a chain", "A comma list of ends, as in `a -> R:r, C:c`, stands only at the end of a chain: each item is one end. Begin a new statement to go on from one of them."),
     row("E0110", "nested too deeply", "Brackets, conditionals and operations within one another have a limit, so that no text can exhaust the memory of the tool. Name a part of the expression as a parameter or a signal."),
-    row("E0111", "form of argument not allowed here", "Functions take plain values separated by commas; `;`, `name =` and arrows belong to other forms."),
+    row("E0111", "form of argument not allowed here", "Functions take plain values separated by commas; `;`, `name =` and arrows belong to other forms. A bond is read by the names of its two ends, as in `f(a -> b)`."),
     row("E0112", "wrong number of arguments", "The function takes another number of arguments than were given."),
     row("E0113", "comparisons do not chain", "`a < b < c` would compare the truth of `a < b` with c. Write `a < b and b < c`."),
     row("E0114", "`;` between arguments", "Arguments of elements are separated by commas. `;` separates the points of `pwl` and the rows of tables."),

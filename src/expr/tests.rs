@@ -24,6 +24,7 @@ mod bond {
         argument      = _{ named | arrow | expression }
         named         = { name ~ "=" ~ !"=" ~ expression }
         arrow         = { name ~ "->" ~ name }
+        after_call    = { !ANY ~ ANY }
         op_power      = @{ "^" }
         op_and        = @{ "and" ~ word_end }
         op_or         = @{ "or" ~ word_end }
@@ -47,6 +48,7 @@ mod spice {
         probe         = { ^"v" ~ "(" ~ name ~ ("," ~ name)? ~ ")" }
         function_name = @{ name ~ &"(" }
         argument      = _{ expression }
+        after_call    = { !ANY ~ ANY }
         op_power      = @{ "^" | "**" }
         op_and        = @{ "&&" }
         op_or         = @{ "||" }

@@ -16,6 +16,7 @@ mod dimensions;
 mod domains;
 mod experiment;
 mod observe;
+mod later;
 
 #[cfg(test)]
 mod tests;
@@ -53,6 +54,9 @@ pub fn elaborate(
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
+    if later::refuse(file, d) {
+        return None;
+    }
     let mut scope = scope::Scope::collect(file, map, d);
     scope.join_bonds(d);
     scope.evaluate_parameters(&overrides.set, d);

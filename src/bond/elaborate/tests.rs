@@ -694,7 +694,7 @@ fn what_is_not_there_yet_is_one_error() {
     errors(&around("for k in 1..3 {\n R:x[k](1)\n m -> x[k]\n}"), &["E0201 for"]);
     errors(&around("if 1 > 0 { m -> R:z(1) }"), &["E0201 if"]);
     errors(&around("loop a: f(m) follows b, bandwidth 2 rad/s"), &["E0201 loop"]);
-    errors(&around("signal x = y[1]"), &["E0202 [1]"]);
+    errors(&around("signal x = y[1]"), &["E0202 1"]);
 }
 
 #[test]

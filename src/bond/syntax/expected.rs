@@ -1,7 +1,8 @@
 //! What the grammar expected, in words.
 
 use super::expression::{Rule, is_operand, is_operator};
-use super::scan::{Piece, STATEMENT_WORDS, UNIT_MARK};
+use super::scan::{Piece, STATEMENT_WORDS};
+use super::token::UNIT_MARK;
 use crate::bond::elements;
 use crate::diagnostic::Diagnostic;
 use crate::quantity::{is_unit_name, nearest};
@@ -29,6 +30,10 @@ pub(super) fn report(
     let offset = piece.span.start as usize;
     let found = &text[offset + at..offset + at + word_length(&masked[at..])];
     let expected = words(rules);
+    if let (true, Some(brace)) = (found.is_empty(), piece.opens) {
+        return Diagnostic::error("E0101", brace, "`{` cannot stand here")
+            .says(format!("expected {expected}"));
+    }
     if found.is_empty() {
         let end = offset + masked.trim_end_matches([' ', '\n']).len();
         let last = text[..end].chars().next_back().map_or(0, char::len_utf8);
@@ -74,8 +79,17 @@ fn words(rules: &[Rule]) -> String {
             Rule::equals => "`=`",
             Rule::comma => "`,`",
             Rule::arrow => "an arrow",
-            Rule::name | Rule::word => "a name",
+            Rule::name | Rule::word | Rule::part | Rule::header_parameter => "a name",
+            Rule::option => "the name of an option",
+            Rule::domain => "a domain",
+            Rule::direction => "`in` or `out`",
             Rule::path | Rule::end | Rule::ends | Rule::kind => "an element",
+            Rule::port_number => "a port",
+            Rule::dots => "`..`",
+            Rule::key_follows => "`follows`",
+            Rule::bandwidth | Rule::key_bandwidth => "`bandwidth`",
+            Rule::margin | Rule::key_margin => "`margin`",
+            Rule::observed => "a value",
             Rule::colon_of_kind => "`:`",
             Rule::text => "a text in quotes",
             Rule::unit_text => "a unit",

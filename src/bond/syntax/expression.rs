@@ -1,7 +1,7 @@
 //! Expressions of `.bg` files: what the shared grammar leaves to the language.
 
-use super::scan::UNIT_MARK;
-use super::tree::{Argument, Call, Expr, Label, Leaf, Name, Part, Path, Value};
+use super::token::UNIT_MARK;
+use super::tree::{Argument, Call, Expr, Label, Leaf, Name, Part, Path, Sum, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{Dialect, Node};
@@ -46,17 +46,30 @@ impl Reader<'_> {
         name
     }
 
-    pub fn path(&self, pair: &Pair<'_, Rule>) -> Path {
-        let span = self.place(pair);
-        let mut start = span.start as usize;
-        let mut parts = self.source(span).split('.').map(|part| {
-            let end = start + part.len();
-            let span = Span::new(self.file, start, end);
-            start = end + 1;
-            Part { text: part.to_string(), indices: vec![], span }
-        });
-        let name = parts.next().unwrap_or(Part { text: String::new(), indices: vec![], span });
-        Path { name, members: parts.collect(), span }
+    /// Names joined by dots, with their indices.
+    pub fn path(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Path> {
+        let span = self.place(&pair);
+        let mut parts = pair.into_inner();
+        let name = self.part(parts.next()?, d)?;
+        let mut members = vec![];
+        for part in parts {
+            members.push(self.part(part, d)?);
+        }
+        Some(Path { name, members, span })
+    }
+
+    /// A name with its indices, or the number of a port.
+    pub fn part(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Part> {
+        let mut span = self.place(&pair);
+        let mut indices = vec![];
+        for inner in pair.into_inner() {
+            let before = &self.text[span.start as usize..self.place(&inner).start as usize];
+            span.end = span.start + before.trim_end().len() as u32;
+            for index in inner.into_inner().filter(|part| part.as_rule() == Rule::expression) {
+                indices.push(self.expression(index, d)?);
+            }
+        }
+        Some(Part { text: self.source(span).to_string(), indices, span })
     }
 
     /// A number with or without a unit.
@@ -116,12 +129,6 @@ impl Reader<'_> {
         parse::expression(self, pair, d)
     }
 
-    /// `[k]` after a name or a reading.
-    pub fn index(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
-        let inner = pair.into_inner().next()?;
-        self.expression(inner, d)
-    }
-
     fn matrix(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Vec<Vec<Expr>>> {
         let mut rows = vec![vec![]];
         for part in pair.into_inner() {
@@ -171,10 +178,28 @@ impl Reader<'_> {
     ) -> Option<Vec<Vec<Argument>>> {
         let mut rows = vec![vec![]];
         let mut failed = false;
+        let mut arrow = false;
         for pair in pairs {
-            if pair.as_rule() == Rule::row_break {
-                rows.push(vec![]);
-                continue;
+            match pair.as_rule() {
+                Rule::row_break => {
+                    rows.push(vec![]);
+                    continue;
+                }
+                Rule::half_arrow => {
+                    arrow = true;
+                    continue;
+                }
+                _ if arrow => {
+                    arrow = false;
+                    let from = rows.last_mut().and_then(Vec::pop);
+                    let to = self.argument(pair, d);
+                    match (from.zip(to).and_then(|(from, to)| bond(from, to, d)), rows.last_mut()) {
+                        (Some(argument), Some(row)) => row.push(argument),
+                        _ => failed = true,
+                    }
+                    continue;
+                }
+                _ => {}
             }
             match (self.argument(pair, d), rows.last_mut()) {
                 (Some(argument), Some(row)) => row.push(argument),
@@ -261,46 +286,63 @@ impl Language for Reader<'_> {
         match pair.as_rule() {
             Rule::number => self.number(&pair, d),
             Rule::reference => {
-                let mut parts = pair.into_inner();
-                let path = self.path(&parts.next()?);
-                if let Some(index) = parts.next() {
-                    d.push(arrays(self.place(&index)));
-                    return None;
-                }
+                let path = self.path(pair.into_inner().next()?, d)?;
                 Some(Expr::new(Node::Leaf(Leaf::Name(path)), span))
             }
             _ => {
-                let mut parts = pair.into_inner();
-                let name = self.name(&parts.next()?);
-                let from = self.path(&parts.next()?);
-                let to = self.path(&parts.find(|part| part.as_rule() == Rule::path)?);
-                let index = match parts.next() {
-                    Some(index) => Some(self.index(index, d)?),
-                    None => None,
-                };
-                let place = from.span.join(to.span);
-                let bond = Argument { label: None, value: Value::Bond(from, to), span: place };
-                let call = Call { name, rows: vec![vec![bond]], index };
-                Some(Expr::new(Node::Leaf(Leaf::Call(call)), span))
+                let mut values = vec![];
+                let mut variable = None;
+                for part in pair.into_inner() {
+                    match part.as_rule() {
+                        Rule::name => variable = Some(self.name(&part)),
+                        Rule::expression => values.push(self.expression(part, d)),
+                        _ => {}
+                    }
+                }
+                let values: Option<Vec<Expr>> = values.into_iter().collect();
+                let mut values = values?.into_iter();
+                let range = (values.next()?, values.next()?);
+                let sum = Sum { variable: variable?, range, term: values.next()? };
+                Some(Expr::new(Node::Leaf(Leaf::Sum(sum)), span))
             }
         }
     }
 
     fn call(&mut self, _: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = self.place(&pair);
-        let mut parts = pair.into_inner();
+        let mut parts: Vec<_> = pair.into_inner().collect();
+        let index = parts.pop_if(|last| last.as_rule() == Rule::after_call);
+        let mut parts = parts.into_iter();
         let name = self.name(&parts.next()?);
-        let rows = self.arguments(parts, d)?;
-        let call = Call { name, rows, index: None };
+        let rows = self.arguments(parts, d);
+        let index = match index {
+            Some(index) => Some(self.expression(index.into_inner().next()?, d)?),
+            None => None,
+        };
+        let call = Call { name, rows: rows?, index };
         Some(Expr::new(Node::Leaf(Leaf::Call(call)), span))
     }
 }
 
-/// The error for indices of names.
-pub(super) fn arrays(span: Span) -> Diagnostic {
-    Diagnostic::error("E0202", span, "arrays of elements are not part of the language yet")
-        .says("an index after a name")
-        .help("give each element a name of its own, such as `ph_1`, `ph_2`")
+/// The argument that two ends and an arrow between them make.
+fn bond(from: Argument, to: Argument, d: &mut Vec<Diagnostic>) -> Option<Argument> {
+    let span = from.span.join(to.span);
+    let mut end = |argument: Argument| {
+        let place = argument.span;
+        if let (None, Value::Expr(expr)) = (argument.label, argument.value)
+            && let Node::Leaf(Leaf::Name(path)) = *expr.node
+        {
+            return Some(path);
+        }
+        d.push(
+            Diagnostic::error("E0111", place, "a bond is read by the names of its ends")
+                .says("not a name")
+                .help("as in `f(armature -> L)`"),
+        );
+        None
+    };
+    let (from, to) = (end(from), end(to));
+    Some(Argument { label: None, value: Value::Bond(from?, to?), span })
 }
 
 /// Whether a rule is an operand's, for messages.
@@ -313,7 +355,7 @@ pub(super) fn is_operand(rule: Rule) -> bool {
             | Rule::key_if
             | Rule::conditional
             | Rule::special
-            | Rule::bond_reading
+            | Rule::key_sum
             | Rule::call
             | Rule::number
             | Rule::literal

@@ -4,8 +4,10 @@
 //! diagnostic, and reading goes on at the next statement.
 
 pub mod tree;
+pub mod token;
 mod scan;
 mod parse;
+mod statement;
 mod expression;
 mod expected;
 

@@ -1,65 +1,286 @@
-//! From statements' texts to statements.
+//! From a text to statements, and the blocks that hold them.
+//!
+//! The grammar reads one statement or one head of a block at a time; which braces belong together is settled here,
+//! with a stack and not by recursion, so that an error costs its own line only and a missing brace is named where it
+//! is missing.
 
-use super::expected;
-use super::expression::{BondParser, Reader, Rule, arrays};
-use super::scan::{Piece, STATEMENT_WORDS, Scan};
+use super::scan::{Piece, STATEMENT_WORDS, Scan, Step, closes_nothing};
+use super::statement::{self, Head, Said};
 use super::tree::*;
-use crate::bond::graph::Stroke;
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::expr::Node;
-use crate::expr::parse;
-use crate::quantity::Unit;
+use crate::expr::parse::too_deep;
+use crate::quantity::nearest;
 use crate::source::{FileId, SourceMap, Span};
-use pest::Parser;
-use pest::iterators::{Pair, Pairs};
 
 /// Errors of syntax after which reading a file stops telling more: it is probably no bond graph at all.
 const MOST_ERRORS: usize = 30;
+
+/// Blocks within one another, at most; each `else if` counts as one.
+pub const MOST_BLOCKS: usize = 64;
 
 /// Reads a file. Always gives one: what could not be read is reported, and stands in it as unreadable.
 pub fn parse(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> File {
     let text = map.file(file).map_or("", |file| file.text.as_str());
     let scan = Scan::new(file, text);
-    let mut statements = vec![];
-    let before = errors(d);
+    let mut errors = 0;
+    let mut seen = d.len();
+    let mut blocks = Blocks { scan: &scan, open: vec![], statements: vec![], suspect: None };
     let mut at = 0;
-    while let Some(piece) = scan.piece(at, d) {
-        let known = d.len();
-        let statement = if piece.bad { None } else { statement(&scan, text, &piece, d) };
-        // A statement that the language will have is whole; one that cannot be read may hold the start of the next.
-        let whole = statement.is_some() || d[known..].iter().any(|d| d.code == "E0201");
-        at = if whole { piece.next } else { piece.restart };
-        let kind = statement.unwrap_or(StatementKind::Unreadable);
-        statements.push(Statement { kind, span: piece.span });
-        if errors(d) - before >= MOST_ERRORS {
+    while let Some(step) = scan.step(at, d) {
+        at = match step {
+            Step::Piece(piece) => blocks.piece(piece, d),
+            Step::Closes(brace, next) => blocks.close(brace, next, d),
+        };
+        errors += d[seen..].iter().filter(|d| d.severity == Severity::Error).count();
+        seen = d.len();
+        if errors >= MOST_ERRORS {
             d.push(
                 Diagnostic::note("N0101", Span::NONE, "the rest of the file is not looked at")
                     .because(format!("{MOST_ERRORS} errors of syntax were enough")),
             );
+            blocks.open.clear();
             break;
         }
     }
-    File { file, statements, trivia: scan.trivia() }
+    blocks.never_closed(d);
+    File { file, statements: blocks.statements, trivia: scan.trivia() }
 }
 
-fn errors(d: &[Diagnostic]) -> usize {
-    d.iter().filter(|d| d.severity == Severity::Error).count()
+/// The statements read so far, and the blocks that are open.
+struct Blocks<'a> {
+    scan: &'a Scan<'a>,
+    open: Vec<Block>,
+    statements: Vec<Statement>,
+    /// The first brace that another one than its own seems to have closed, by how the lines are indented.
+    suspect: Option<Span>,
+}
+
+/// A block that is open.
+struct Block {
+    /// `None` when it could not be read.
+    head: Option<Head>,
+    /// Where the statement begins.
+    start: Span,
+    /// The `{`.
+    brace: Span,
+    body: Vec<Statement>,
+    /// What stands before `else`, once that has been read.
+    then: Option<Vec<Statement>>,
+    /// After `else if`: it ends with the block within it.
+    chained: bool,
+}
+
+impl Blocks<'_> {
+    /// Puts a statement where it belongs; a block that ends with it ends.
+    fn add(&mut self, statement: Statement) {
+        let Some(block) = self.open.last_mut() else {
+            self.statements.push(statement);
+            return;
+        };
+        let span = statement.span;
+        block.body.push(statement);
+        if block.chained {
+            self.finish(span);
+        }
+    }
+
+    /// Reads a piece; returns where to go on.
+    fn piece(&mut self, piece: Piece, d: &mut Vec<Diagnostic>) -> usize {
+        let said = statement::read(self.scan, &piece, d);
+        let unreadable = Statement { kind: StatementKind::Unreadable, span: piece.span };
+        let head = match said {
+            Some(Said::Statement(kind)) if piece.opens.is_none() => {
+                self.add(Statement { kind, span: piece.span });
+                return piece.next;
+            }
+            Some(Said::Head(head)) => Some(head),
+            Some(Said::Statement(_)) => None,
+            None => {
+                if let Some(restart) = piece.restart {
+                    self.add(unreadable);
+                    return restart;
+                }
+                None
+            }
+        };
+        let Some(brace) = piece.opens else {
+            if head.is_some() {
+                d.push(no_body(self.scan, piece.span));
+            }
+            self.add(unreadable);
+            return piece.next;
+        };
+        if head.is_none() && !statement::is_head(self.scan.masked(piece.span)) {
+            // The braces of something else: their content is passed over, unless it looks like a body.
+            let (end, body) = self.scan.skip_block(piece.next);
+            if said_well(&piece, brace, d) {
+                d.push(no_head(self.scan, piece.span, brace));
+            }
+            if !body || end.is_none() {
+                self.add(unreadable);
+                return end.unwrap_or(piece.next);
+            }
+        }
+        if matches!(head, Some(Head::Model { .. })) {
+            self.close_before_model(piece.span, d);
+        }
+        self.open_block(head, piece.span, brace, piece.next, d)
+    }
+
+    fn open_block(
+        &mut self,
+        head: Option<Head>,
+        start: Span,
+        brace: Span,
+        next: usize,
+        d: &mut Vec<Diagnostic>,
+    ) -> usize {
+        if self.open.len() >= MOST_BLOCKS {
+            d.push(
+                too_deep(brace).because(format!("at most {MOST_BLOCKS} blocks within one another")),
+            );
+            let next = self.skip(next);
+            self.add(Statement { kind: StatementKind::Unreadable, span: start.join(brace) });
+            return next;
+        }
+        self.open.push(Block { head, start, brace, body: vec![], then: None, chained: false });
+        next
+    }
+
+    /// Passes over the rest of a block, and the branches after it.
+    fn skip(&self, mut next: usize) -> usize {
+        loop {
+            let Some(end) = self.scan.skip_block(next).0 else { return usize::MAX };
+            let Some(brace) = self.scan.otherwise(end).and_then(|at| self.scan.next_brace(at))
+            else {
+                return end;
+            };
+            next = brace;
+        }
+    }
+
+    /// Takes a `}`; returns where to go on.
+    fn close(&mut self, brace: Span, next: usize, d: &mut Vec<Diagnostic>) -> usize {
+        let Some(block) = self.open.last_mut() else {
+            d.push(closes_nothing(brace, '}'));
+            return next;
+        };
+        let indents = (self.scan.indent(block.start.start), self.scan.indent(brace.start));
+        if let (Some(opened), Some(closed)) = indents
+            && closed < opened
+        {
+            self.suspect.get_or_insert(block.brace);
+        }
+        if let (Some(Head::If { .. }), None) = (&block.head, &block.then)
+            && let Some(after) = self.scan.otherwise(next)
+        {
+            block.then = Some(std::mem::take(&mut block.body));
+            if let Some((brace, next)) = self.scan.brace(after) {
+                block.brace = brace;
+                return next;
+            }
+            block.chained = true;
+            return after;
+        }
+        self.finish(brace);
+        next
+    }
+
+    /// Makes a statement of the innermost block, whose last part stands at `end`.
+    fn finish(&mut self, end: Span) {
+        let Some(block) = self.open.pop() else { return };
+        let span = block.start.join(end);
+        let kind = match block.head {
+            Some(Head::Model { name, parameters }) => {
+                StatementKind::Model(Model { name, parameters, body: block.body })
+            }
+            Some(Head::For { variable, range }) => {
+                StatementKind::For { variable, range, body: block.body }
+            }
+            Some(Head::If { condition }) => match block.then {
+                Some(then) => StatementKind::If { condition, then, otherwise: block.body },
+                None => StatementKind::If { condition, then: block.body, otherwise: vec![] },
+            },
+            None => StatementKind::Unreadable,
+        };
+        self.add(Statement { kind, span });
+    }
+
+    /// Models stand side by side: one that begins no further to the right than an open block tells that a brace is
+    /// missing before it.
+    fn close_before_model(&mut self, start: Span, d: &mut Vec<Diagnostic>) {
+        let indent = |span: Span| self.scan.indent(span.start);
+        let Some(outer) = self.open.first() else { return };
+        if let (Some(outer), Some(here)) = (indent(outer.start), indent(start))
+            && here <= outer
+        {
+            self.never_closed(d);
+        }
+    }
+
+    /// Reports the blocks that are open where none may be, as one error, and ends them.
+    fn never_closed(&mut self, d: &mut Vec<Diagnostic>) {
+        let Some(block) = self.open.last() else { return };
+        let at = self.suspect.take().unwrap_or(block.brace);
+        let error =
+            Diagnostic::error("E0104", at, "`{` is never closed").says("no `}` for this one");
+        d.push(if at == block.brace {
+            error
+        } else {
+            error
+                .label(block.brace, "this one takes its place")
+                .because("told by how the lines are indented")
+        });
+        while let Some(block) = self.open.last() {
+            let end = block.body.last().map_or(block.brace, |last| last.span);
+            self.finish(end);
+        }
+        let span = Span { end: at.start, ..at };
+        self.add(Statement { kind: StatementKind::Unreadable, span });
+    }
+}
+
+/// Whether no error of the piece has been reported.
+fn said_well(piece: &Piece, brace: Span, d: &[Diagnostic]) -> bool {
+    let within = |span: Span| span.file == brace.file && span.start >= piece.span.start;
+    !d.last().and_then(|last| last.labels.first()).is_some_and(|label| within(label.span))
+}
+
+/// The error for the head of a block without one.
+fn no_body(scan: &Scan<'_>, span: Span) -> Diagnostic {
+    let masked = scan.masked(span);
+    let last = masked.chars().next_back().map_or(0, char::len_utf8) as u32;
+    let word = statement::first_word(masked);
+    Diagnostic::error(
+        "E0101",
+        Span { start: span.end - last, ..span },
+        "the statement ends too early",
+    )
+    .says("expected `{` after this")
+    .help(format!("what belongs to `{word}` stands between braces"))
+}
+
+/// The error for a block after a statement that takes none.
+fn no_head(scan: &Scan<'_>, span: Span, brace: Span) -> Diagnostic {
+    let error = Diagnostic::error("E0101", brace, "`{` cannot stand here")
+        .says("expected the end of the statement");
+    let word = statement::first_word(scan.masked(span));
+    match nearest(word, super::scan::BLOCK_WORDS.iter().copied()) {
+        Some(meant) if !STATEMENT_WORDS.contains(&word) && word.len() > 1 => {
+            error.help(format!("did you mean `{meant}`?"))
+        }
+        _ => error.help("braces stand after `model`, `for`, `if` and `else`"),
+    }
 }
 
 /// Reads a value that stands alone: `2mH`, `0.5*S`. A text of the command line is of no file, [`Span::NONE`]'s.
 pub fn parse_value(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<Expr> {
-    alone(text, file, Rule::value_alone, d, |reader, mut pairs, d| {
-        parse::expression(reader, pairs.next()?, d)
-    })
+    statement::value_alone(&Scan::new(file, text), &alone(text, file, d)?, d)
 }
 
 /// Reads what an input gets: `x_ref = step(0.1 s, 0 mm, 20 mm)`.
 pub fn parse_drive(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<(Part, Expr)> {
-    alone(text, file, Rule::drive_alone, d, |reader, mut pairs, d| {
-        let name = reader.name(&pairs.next()?);
-        let value = pairs.find(|pair| pair.as_rule() == Rule::expression)?;
-        Some((Part::from(name), parse::expression(reader, value, d)?))
-    })
+    statement::drive_alone(&Scan::new(file, text), &alone(text, file, d)?, d)
 }
 
 /// Reads a list to observe: `x in mm, e(pump) in bar as "pressure"`.
@@ -68,307 +289,23 @@ pub fn parse_observe(
     file: FileId,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Vec<ObserveItem>> {
-    alone(text, file, Rule::observe_alone, d, observed_items)
+    statement::observe_alone(&Scan::new(file, text), &alone(text, file, d)?, d)
 }
 
-fn alone<T>(
-    text: &str,
-    file: FileId,
-    rule: Rule,
-    d: &mut Vec<Diagnostic>,
-    read: impl FnOnce(&mut Reader<'_>, Pairs<'_, Rule>, &mut Vec<Diagnostic>) -> Option<T>,
-) -> Option<T> {
-    let scan = Scan::new(file, text);
-    let Some(mut piece) = scan.piece(0, d) else {
-        d.push(Diagnostic::error("E0108", Span::new(file, 0, 0), "nothing is written here"));
-        return None;
-    };
-    if piece.bad {
-        return None;
-    }
-    piece.span.end = text.len() as u32;
-    pairs(&scan, text, &piece, rule, d).and_then(|(mut reader, masked)| {
-        let pairs = masked.parse(rule)?;
-        read(&mut reader, pairs, d)
-    })
-}
-
-/// A statement's text as the grammar sees it.
-struct Masked(String);
-
-impl Masked {
-    /// The pairs within the statement; its errors have been reported.
-    fn parse(&self, rule: Rule) -> Option<Pairs<'_, Rule>> {
-        let inner = BondParser::parse(rule, &self.0).ok()?.next()?.into_inner();
-        Some(inner)
-    }
-}
-
-/// The masked text, once it is known to be of the form of a rule; else the error is reported.
-fn pairs<'a>(
-    scan: &Scan<'_>,
-    text: &'a str,
-    piece: &Piece,
-    rule: Rule,
-    d: &mut Vec<Diagnostic>,
-) -> Option<(Reader<'a>, Masked)> {
-    let masked = scan.masked(piece);
-    let offset = piece.span.start as usize;
-    if let Some(at) = parse::nesting(&masked, None) {
-        d.push(parse::too_deep(Span::new(piece.span.file, offset + at, offset + at + 1)));
-        return None;
-    }
-    if let Err(error) = BondParser::parse(rule, &masked) {
-        d.push(expected::report(piece, text, &masked, rule, &error));
-        return None;
-    }
-    Some((Reader { file: piece.span.file, text, offset }, Masked(masked)))
-}
-
-/// Reads one statement.
-fn statement(
-    scan: &Scan<'_>,
-    text: &str,
-    piece: &Piece,
-    d: &mut Vec<Diagnostic>,
-) -> Option<StatementKind> {
-    let masked = scan.masked(piece);
-    let word = statement_word(&masked);
-    let rule = match word {
-        Some("param") => Rule::param_statement,
-        Some("signal") => Rule::signal_statement,
-        Some("input" | "output") => Rule::names_statement,
-        Some("drive") => Rule::drive_statement,
-        Some("simulate") => Rule::simulate_statement,
-        Some("options") => Rule::options_statement,
-        Some("observe") => Rule::observe_statement,
-        Some(word) => {
-            d.push(later(word, piece.span));
-            return None;
+/// All of a text as one piece.
+fn alone(text: &str, file: FileId, d: &mut Vec<Diagnostic>) -> Option<Piece> {
+    match Scan::new(file, text).step(0, d) {
+        Some(Step::Piece(mut piece)) => {
+            piece.span.end = text.len() as u32;
+            (!piece.bad).then_some(piece)
         }
-        None => Rule::chain_statement,
-    };
-    let (mut reader, masked) = pairs(scan, text, piece, rule, d)?;
-    let pairs = masked.parse(rule)?;
-    let reader = &mut reader;
-    let mut names = vec![];
-    let mut values = vec![];
-    let mut description = None;
-    match rule {
-        Rule::chain_statement => return chain(reader, pairs, d).map(StatementKind::Chain),
-        Rule::observe_statement => {
-            return observed_items(reader, pairs, d).map(StatementKind::Observe);
+        Some(Step::Closes(brace, _)) => {
+            d.push(closes_nothing(brace, '}'));
+            None
         }
-        Rule::options_statement => return options(reader, pairs, d).map(StatementKind::Options),
-        Rule::simulate_statement => return simulate(reader, pairs, d),
-        _ => {}
-    }
-    for pair in pairs {
-        match pair.as_rule() {
-            Rule::name => names.push(Part::from(reader.name(&pair))),
-            Rule::expression => values.push(parse::expression(reader, pair, d)?),
-            Rule::text => description = Some(reader.text(&pair)),
-            _ => {}
+        None => {
+            d.push(Diagnostic::error("E0108", Span::new(file, 0, 0), "nothing is written here"));
+            None
         }
     }
-    Some(match word {
-        Some("input") => StatementKind::Input(names),
-        Some("output") => StatementKind::Output(names),
-        _ => {
-            let (name, value) = (names.pop()?, values.pop()?);
-            match word {
-                Some("param") => StatementKind::Parameter { name, value, description },
-                Some("signal") => StatementKind::Signal { name, value },
-                _ => StatementKind::Drive { name, value },
-            }
-        }
-    })
-}
-
-/// The statement word that a statement begins with, unless it is the name of an element there: before an arrow, a
-/// dot, a comma, a bracket or a colon, or alone.
-fn statement_word(masked: &str) -> Option<&'static str> {
-    let end = masked.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(masked.len());
-    let word = STATEMENT_WORDS.iter().find(|word| **word == &masked[..end])?;
-    let after = masked[end..].trim_start_matches([' ', '\n']);
-    let name = after.is_empty()
-        || ["->", "|->", ".", ","].iter().any(|sign| after.starts_with(sign))
-        || (after.starts_with([':', '(']) && !matches!(*word, "observe" | "if"));
-    (!name).then_some(word)
-}
-
-/// The error for statements that the language will have.
-fn later(word: &str, span: Span) -> Diagnostic {
-    let (what, instead) = match word {
-        "model" | "port" => ("models", "write the elements of the model where it is used"),
-        "import" => ("imports", "copy what you need into this file"),
-        "for" => ("loops over elements", "write each element out"),
-        "if" => ("conditional elements", "write a file for each case"),
-        _ => ("named regulator loops", "leave the statement out: it changes no simulation"),
-    };
-    let start = Span { end: span.start + word.len() as u32, ..span };
-    Diagnostic::error("E0201", start, format!("{what} are not part of the language yet"))
-        .says("this statement cannot be used yet")
-        .help(instead)
-}
-
-fn chain(
-    reader: &mut Reader<'_>,
-    pairs: Pairs<'_, Rule>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Chain> {
-    let mut lists: Vec<Vec<ChainEnd>> = vec![];
-    let mut arrows = vec![];
-    let mut failed = false;
-    for pair in pairs {
-        match pair.as_rule() {
-            Rule::ends => {
-                let mut ends = vec![];
-                for pair in pair.into_inner().filter(|pair| pair.as_rule() == Rule::end) {
-                    match chain_end(reader, pair, d) {
-                        Some(end) => ends.push(end),
-                        None => failed = true,
-                    }
-                }
-                lists.push(ends);
-            }
-            Rule::arrow => {
-                let stroke = match pair.as_str() {
-                    "->|" => Some(Stroke::AtTo),
-                    "|->" => Some(Stroke::AtFrom),
-                    _ => None,
-                };
-                arrows.push(Arrow { stroke, span: reader.place(&pair) });
-            }
-            _ => {}
-        }
-    }
-    let last = lists.len().checked_sub(1)?;
-    for (k, list) in lists.iter().enumerate() {
-        if let ([_, second, ..], true) = (list.as_slice(), k < last) {
-            d.push(
-                Diagnostic::error(
-                    "E0109",
-                    second.span,
-                    "a list of ends stands only at the end of a chain",
-                )
-                .says("an arrow follows this list")
-                .help("begin a statement of its own for each of them"),
-            );
-            failed = true;
-        }
-    }
-    if failed {
-        return None;
-    }
-    let mut lists = lists.into_iter();
-    Some(Chain { first: lists.next()?, links: arrows.into_iter().zip(lists).collect() })
-}
-
-fn chain_end(
-    reader: &mut Reader<'_>,
-    pair: Pair<'_, Rule>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<ChainEnd> {
-    let span = reader.place(&pair);
-    let (mut kind, mut path, mut arguments) = (None, None, None);
-    for part in pair.into_inner() {
-        match part.as_rule() {
-            Rule::kind => kind = Some(reader.name(&part)),
-            Rule::path => path = Some(reader.path(&part)),
-            Rule::index => {
-                d.push(arrays(reader.place(&part)));
-                return None;
-            }
-            Rule::element_arguments => {
-                let place = reader.place(&part);
-                let mut rows = reader.arguments(part.into_inner(), d)?;
-                if rows.len() > 1 {
-                    d.push(
-                        Diagnostic::error(
-                            "E0114",
-                            place,
-                            "the arguments of an element are separated by commas",
-                        )
-                        .says("`;` separates points of `pwl` and rows of matrices"),
-                    );
-                    return None;
-                }
-                arguments = rows.pop();
-            }
-            _ => {}
-        }
-    }
-    Some(ChainEnd { kind, path: path?, arguments, span })
-}
-
-fn observed_items(
-    reader: &mut Reader<'_>,
-    pairs: Pairs<'_, Rule>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Vec<ObserveItem>> {
-    let mut items = vec![];
-    for pair in pairs.filter(|pair| pair.as_rule() == Rule::observed) {
-        let span = reader.place(&pair);
-        let (mut expr, mut unit, mut name) = (None, None, None);
-        for part in pair.into_inner() {
-            match part.as_rule() {
-                Rule::expression => expr = Some(parse::expression(reader, part, d)?),
-                Rule::unit_text => {
-                    let place = reader.place(&part);
-                    unit = Some((reader.unit(place, d)?, place));
-                }
-                Rule::text => name = Some(reader.text(&part)),
-                _ => {}
-            }
-        }
-        items.push(ObserveItem { expr: expr?, unit, name, span });
-    }
-    Some(items)
-}
-
-fn options(
-    reader: &mut Reader<'_>,
-    pairs: Pairs<'_, Rule>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Vec<(Name, Name)>> {
-    let mut options = vec![];
-    for pair in pairs.filter(|pair| pair.as_rule() == Rule::option) {
-        let mut parts = pair.into_inner().filter(|part| part.as_rule() != Rule::equals);
-        let key = reader.name(&parts.next()?);
-        let value = parts.next()?;
-        let mut text = reader.name(&value);
-        if value.as_rule() == Rule::number {
-            // With a unit the text of its value in SI, else as written.
-            let number = reader.number(&value, d)?;
-            if let Node::Leaf(Leaf::Quantity(value, Unit { .. })) = &*number.node {
-                text.text = value.to_string();
-            }
-        }
-        options.push((key, text));
-    }
-    Some(options)
-}
-
-fn simulate(
-    reader: &mut Reader<'_>,
-    pairs: Pairs<'_, Rule>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<StatementKind> {
-    let (mut until, mut step) = (None, None);
-    for pair in pairs {
-        let place = reader.place(&pair);
-        let slot = match pair.as_rule() {
-            Rule::until => &mut until,
-            Rule::step => &mut step,
-            _ => continue,
-        };
-        let value = pair.into_inner().find(|part| part.as_rule() == Rule::expression)?;
-        let value = parse::expression(reader, value, d)?;
-        if slot.replace(value).is_some() {
-            d.push(Diagnostic::error("E0115", place, "this was said before in the statement"));
-            return None;
-        }
-    }
-    Some(StatementKind::Simulate { until, step })
 }

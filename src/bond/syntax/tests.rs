@@ -364,3 +364,193 @@ proptest! {
         elaborated(&text);
     }
 }
+
+/// The one model of a text without errors, and its body.
+fn model(text: &str) -> Model {
+    let mut statements = good(text);
+    assert_eq!(statements.len(), 1, "{text}");
+    match statements.pop() {
+        Some(StatementKind::Model(model)) => model,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn models_and_their_ports() {
+    let motor = model(
+        "model DcMotor(L = 1.2 mH, R = 0.1 Ohm, Phi = 0.5 V*s, Jmp, fmp = 0 N*m*s) {
+           port in  supply : electrical
+           port out shaft  : rotation # the far side
+           port in h[k] : pseudo-thermal; port in free
+           supply -> 1:armature -> GY:Phi -> 1:rotor -> shaft
+           armature -> I:L, R:R
+           rotor -> I:Jmp,
+                    R:fmp
+         }",
+    );
+    assert_eq!(motor.name.text, "DcMotor");
+    let defaults: Vec<_> =
+        motor.parameters.iter().map(|p| (p.name.text.as_str(), p.default.is_some())).collect();
+    assert_eq!(defaults, [("L", true), ("R", true), ("Phi", true), ("Jmp", false), ("fmp", true)]);
+    assert_eq!(motor.body.len(), 7);
+    let ports: Vec<_> = motor
+        .body
+        .iter()
+        .filter_map(|statement| match &statement.kind {
+            StatementKind::Port(port) => {
+                let domain = port.domain.as_ref().map_or("", |domain| domain.text.as_str());
+                Some((port.into, port.name.text.as_str(), port.name.indices.len(), domain))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(
+        ports,
+        [
+            (true, "supply", 0, "electrical"),
+            (false, "shaft", 0, "rotation"),
+            (true, "h", 1, "pseudo-thermal"),
+            (true, "free", 0, "")
+        ]
+    );
+    // The brace may stand on the next line; empty bodies; a header without parameters.
+    assert!(model("model A\n\n{\n}").body.is_empty());
+    assert!(model("model A() {}").parameters.is_empty());
+    assert_eq!(model("model A(x = 1,\n y) { 1:a; 1:b }").body.len(), 2);
+    let StatementKind::Import(file) = &good("import \"std/hydraulic.bg\"")[0] else { panic!() };
+    assert_eq!(file.text, "std/hydraulic.bg");
+}
+
+#[test]
+fn blocks() {
+    let StatementKind::For { variable, range, body } =
+        &good("for k in 1..N { EHA:eha[k](x_ref = r[k]) ; bus -> eha[k].supply }")[0]
+    else {
+        panic!()
+    };
+    assert_eq!((variable.text.as_str(), range.0.as_number()), ("k", Some(1.0)));
+    assert_eq!(body.len(), 2);
+    let StatementKind::Chain(chain) = &body[1].kind else { panic!() };
+    let path = &chain.links[0].1[0].path;
+    assert_eq!((path.text().as_str(), path.name.indices.len()), ("eha.supply", 1));
+    let text = "if k > 1 {\n a\n} # one\nelse if (k == 1) { b } else {\n c ; d\n}\n1:x";
+    let statements = good(text);
+    assert_eq!(statements.len(), 2);
+    let StatementKind::If { then, otherwise, .. } = &statements[0] else { panic!() };
+    assert_eq!((then.len(), otherwise.len()), (1, 1));
+    let StatementKind::If { then, otherwise, .. } = &otherwise[0].kind else { panic!() };
+    assert_eq!((then.len(), otherwise.len()), (1, 2));
+    // `else` is a word only after a block of `if`.
+    assert_eq!(good("for k in 1..2 { a }\nelse -> R:r").len(), 2);
+    // Ranges.
+    for text in ["1..3", "1 .. N", "a..b", "k+1..2*N-1", "n[1]..m.2", "1...5", "p[1].n..3"] {
+        assert!(matches!(&good(&format!("for k in {text} {{}}"))[0], StatementKind::For { .. }));
+    }
+    let StatementKind::Loop(regulator) =
+        &good("loop motor.alpha: f(armature) follows I_ref, bandwidth 2000 rad/s,\n margin 60 deg")
+            [0]
+    else {
+        panic!()
+    };
+    assert_eq!(regulator.signal.text(), "motor.alpha");
+    assert!(regulator.bandwidth.is_some() && regulator.margin.is_some());
+    assert!(matches!(&good("loop a: e(x) follows b")[0], StatementKind::Loop(_)));
+}
+
+#[test]
+fn indexed_names() {
+    let StatementKind::Chain(chain) =
+        &good("EHA:eha[k](2) -> eha[k+1].motor.ph[2] -> m[i, j].1")[0]
+    else {
+        panic!()
+    };
+    let ends: Vec<&Path> =
+        chain.first.iter().chain(chain.links.iter().flat_map(|l| &l.1)).map(|e| &e.path).collect();
+    let shape = |path: &Path| {
+        path.parts().map(|p| format!("{}{}", p.text, p.indices.len())).collect::<Vec<_>>()
+    };
+    assert_eq!(shape(ends[0]), ["eha1"]);
+    assert_eq!(shape(ends[1]), ["eha1", "motor0", "ph1"]);
+    assert_eq!(shape(ends[2]), ["m2", "10"]);
+    for text in [
+        "param R[k] = 2 Ohm \"of phase k\"",
+        "signal x[k, 2] = integ(f(rod[k]))",
+        "input x[k], y",
+        "output x[1], y [2]",
+        "drive x[k] = step(0, 0, 1)",
+        "observe e(eha[1].pump) in bar, sum(k in 1..3, x[k]) as \"all\"",
+        "input[2] -> R:for[3]",
+    ] {
+        good(text);
+    }
+    let Node::Leaf(Leaf::Sum(sum)) = &*value("sum(k in 1..N, sum(j in k..N, x[j]*k))").node else {
+        panic!()
+    };
+    assert_eq!(sum.variable.text, "k");
+    assert!(matches!(&*sum.term.node, Node::Leaf(Leaf::Sum(_))));
+    // Readings of bonds, with and without a number.
+    for text in ["f(a[1] -> b.c)", "power(a -> b[k])[2]", "e(a\n -> b)"] {
+        let Node::Leaf(Leaf::Call(call)) = value(text).node.as_ref().clone() else { panic!() };
+        assert!(matches!(call.rows[0][0].value, Value::Bond(..)), "{text}");
+        assert_eq!(call.index.is_some(), text.ends_with(']') && !text.ends_with("k])"), "{text}");
+    }
+    errors("param x = e(a + 1 -> b)", &["E0111 a + 1"]);
+    errors("param x = sqrt(a -> b)", &["E0111 ->"]);
+}
+
+#[test]
+fn errors_within_blocks_cost_their_line() {
+    let body = |text: &str, expected: &[&str]| {
+        let (file, d, map) = read(text);
+        errors(text, expected);
+        let kinds: Vec<_> = file
+            .statements
+            .iter()
+            .map(|s| match &s.kind {
+                StatementKind::Model(model) => format!("model {}", model.body.len()),
+                StatementKind::For { body, .. } => format!("for {}", body.len()),
+                StatementKind::Unreadable => "?".to_string(),
+                _ => map.text(s.span).to_string(),
+            })
+            .collect();
+        (kinds.join(", "), d)
+    };
+    let kinds = |text: &str, expected: &[&str]| body(text, expected).0;
+    assert_eq!(kinds("model A {\n 1:a -> +\n 1:b\n}\n1:c", &["E0101 +"]), "model 2, 1:c");
+    assert_eq!(kinds("model A {\n R:r(1\n 1:b -> c\n}\n1:c", &["E0104 ("]), "model 2, 1:c");
+    assert_eq!(kinds("model A {\n R:r(1\n}\n1:c", &["E0104 ("]), "model 1, 1:c");
+    assert_eq!(kinds("for k in 1..3 { R:r(1 }\n1:c", &["E0104 ("]), "for 1, 1:c");
+    assert_eq!(kinds("model A(x = 1 {\n 1:b +\n}\n1:c", &["E0104 (", "E0101 +"]), "?, 1:c");
+    assert_eq!(kinds("1:a\n}\n1:c", &["E0105 }"]), "1:a, 1:c");
+    assert_eq!(kinds("R:x({1})\n1:c", &["E0101 {"]), "?, 1:c");
+    assert_eq!(kinds("param x = {1, 2}\n1:c", &["E0101 {"]), "?, 1:c");
+    assert_eq!(kinds("{ 1:a }\n1:c", &["E0101 {"]), "?, 1:c");
+    assert_eq!(kinds("for k in 1..3\n1:c", &["E0101 3"]), "?, 1:c");
+    assert_eq!(kinds("for k 1..3 {\n 1:b\n}\n1:c", &["E0101 1"]), "?, 1:c");
+    let (found, d) = body("modle A() {\n 1:b\n 1:d +\n}\n1:c", &["E0101 A", "E0101 +"]);
+    assert_eq!(found, "?, 1:c");
+    assert!(d[0].help.as_ref().unwrap().contains("`model`"));
+    // One error for a brace that is missing, at the block that misses it.
+    let (found, d) = body("1:a\nmodel A {\n  for k in 1..3 {\n    1:b[k]\n}\n1:c", &["E0104 {"]);
+    assert_eq!((found.as_str(), d[0].labels[0].span.start), ("1:a, model 2, ?", 30));
+    let (found, d) = body("model A {\n 1:a\nmodel B {\n 1:b\n}\n1:c", &["E0104 {"]);
+    assert_eq!((found.as_str(), d[0].labels[0].span.start), ("model 1, ?, model 1, 1:c", 8));
+    let (found, d) = body("if 1 { for k in 1..2 {\n 1:a", &["E0104 {"]);
+    assert_eq!(
+        (found.as_str(), d[0].labels[0].span.start),
+        ("if 1 { for k in 1..2 {\n 1:a, ?", 21)
+    );
+}
+
+#[test]
+fn blocks_are_not_nested_without_end() {
+    let deep = |n: usize| format!("{}1:a{}", "if 1 { ".repeat(n), " }".repeat(n));
+    assert_eq!(read(&deep(60)).1, []);
+    errors(&deep(10_000), &["E0110 {"]);
+    let ladder = |n: usize| format!("if 1 {{}}{}", " else if 1 {}".repeat(n));
+    assert_eq!(read(&ladder(60)).1, []);
+    errors(&ladder(10_000), &["E0110 {"]);
+    errors(&"if 1 {".repeat(100_000), &["E0110 {", "E0104 {"]);
+    let (_, d, _) = read(&"}".repeat(100_000));
+    assert_eq!(d.len(), 31);
+}
