@@ -418,7 +418,8 @@ fn powers_read_back_have_the_same_bits() {
     let (trace, _) = run_text("orifice.bg", text, &Overrides::default()).expect("it runs");
     let mut map = bondspice::source::SourceMap::default();
     let (file, mut d) = (map.add("orifice.bg", text), vec![]);
-    let model = bondspice::cli::pipeline::model(&map, file, &Overrides::default(), &mut d).unwrap();
+    let model =
+        bondspice::cli::pipeline::model(&mut map, file, &Overrides::default(), &mut d).unwrap();
     let netlist = bondspice::netlist::write::write(&model.translation.netlist);
     let (back, _) = run_text("orifice.cir", &netlist, &Overrides::default()).expect("it runs");
     assert_eq!(back.columns, trace.columns);
@@ -478,7 +479,7 @@ fn conditions_that_may_jump_are_said() {
                 simulate until 1 s step 0.1 s\n";
     let mut map = bondspice::source::SourceMap::default();
     let (file, mut d) = (map.add("jump.bg", text), vec![]);
-    bondspice::cli::pipeline::prepare(&map, file, &Overrides::default(), None, &mut d)
+    bondspice::cli::pipeline::prepare(&mut map, file, &Overrides::default(), None, &mut d)
         .expect("it compiles");
     let said: Vec<_> = d.iter().filter(|d| d.code == "W0802").collect();
     assert_eq!(said.len(), 1, "{d:#?}");

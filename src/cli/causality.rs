@@ -29,7 +29,7 @@ fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
     let file = session.load(&arguments.file)?;
     pipeline::require_bond(session, file, "asked for its causality")?;
     let mut d = vec![];
-    let graph = pipeline::graph(&session.map, file, &overrides, &mut d);
+    let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
     let found = graph.map(|graph| {
         let causality = causality::analyse(&graph, &mut d);
         (graph, causality)

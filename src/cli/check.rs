@@ -38,12 +38,12 @@ fn check(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
     let mut d = vec![];
     match pipeline::language(&session.map, file) {
         Language::Bond => {
-            if let Some(graph) = pipeline::graph(&session.map, file, &overrides, &mut d) {
+            if let Some(graph) = pipeline::graph(&mut session.map, file, &overrides, &mut d) {
                 pipeline::causality(&graph, &mut d);
             }
         }
         Language::Netlist => {
-            let circuit = pipeline::circuit(&session.map, file, &overrides, &mut d);
+            let circuit = pipeline::circuit(&mut session.map, file, &overrides, &mut d);
             let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d));
             if let Some(stamps) = stamps {
                 sim::compile(&stamps, &mut d);

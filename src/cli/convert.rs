@@ -72,7 +72,7 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     }
     pipeline::require_bond(session, file, "converted")?;
     let mut d = vec![];
-    let model = pipeline::model(&session.map, file, &overrides, &mut d);
+    let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
     let Some(model) = model else { return Err(session.exit()) };
     let text = write::write(&model.translation.netlist);

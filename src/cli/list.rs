@@ -20,7 +20,7 @@ pub fn observables(
     let mut table = Table::new(&["observable", "unit"]);
     match pipeline::language(&session.map, file) {
         Language::Bond => {
-            if let Some(graph) = pipeline::graph(&session.map, file, overrides, &mut d) {
+            if let Some(graph) = pipeline::graph(&mut session.map, file, overrides, &mut d) {
                 for item in elaborate::observables(&graph) {
                     table.row([item.name, item.si_unit]);
                 }
@@ -28,7 +28,7 @@ pub fn observables(
         }
         Language::Netlist => {
             let all = Overrides { observe: Some("all".into()), ..overrides.clone() };
-            let circuit = pipeline::circuit(&session.map, file, &all, &mut d);
+            let circuit = pipeline::circuit(&mut session.map, file, &all, &mut d);
             let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d));
             for (name, _) in stamps.iter().flat_map(|stamps| &stamps.outputs) {
                 let unit = if name.starts_with("v(") { "V" } else { "A" };

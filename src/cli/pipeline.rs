@@ -68,13 +68,14 @@ pub fn require_bond(session: &mut Session, file: FileId, what: &str) -> Result<(
 
 /// The graph of a bond-graph text.
 pub fn graph(
-    map: &SourceMap,
+    map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
     let syntax = syntax::parse(map, file, d);
     check_options(&syntax, overrides, d);
+    elaborate::load_tables(&syntax, map, d);
     elaborate::elaborate(&syntax, map, overrides, d)
 }
 
@@ -134,7 +135,7 @@ pub struct Model {
 
 /// From a bond-graph text to its netlist.
 pub fn model(
-    map: &SourceMap,
+    map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
@@ -177,7 +178,7 @@ impl Model {
 
 /// From a text of either language to its flat circuit, and the units of its columns by name.
 pub fn circuit(
-    map: &SourceMap,
+    map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
@@ -252,7 +253,7 @@ pub enum Pick {
 
 /// From a text to a circuit ready to run. Of several analyses the last, unless one is picked.
 pub fn prepare(
-    map: &SourceMap,
+    map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     pick: Option<Pick>,
@@ -371,7 +372,7 @@ pub fn run_text(
     let mut map = SourceMap::default();
     let file = map.add(name, text);
     let mut d = vec![];
-    let Some(run) = prepare(&map, file, overrides, None, &mut d) else { return Err(d) };
+    let Some(run) = prepare(&mut map, file, overrides, None, &mut d) else { return Err(d) };
     let mut trace = run.trace();
     match run.go(&mut trace) {
         Ok(statistics) => Ok((trace, statistics)),
@@ -393,7 +394,7 @@ pub fn emit(
     stage: Stage,
 ) -> Result<String, Exit> {
     let mut d = vec![];
-    let map = &session.map;
+    let map = &mut session.map;
     let bond = language(map, file) == Language::Bond;
     let text = match stage {
         Stage::Graph | Stage::Causality if !bond => {
@@ -429,7 +430,7 @@ pub fn emit(
 /// # Errors
 /// Why the circuit's run did not reach its end.
 pub fn verify(
-    map: &SourceMap,
+    map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,

@@ -99,7 +99,7 @@ fn prepare(
     session: &mut Session,
 ) -> Result<Run, Exit> {
     let mut d = vec![];
-    let run = pipeline::prepare(&session.map, file, overrides, arguments.analysis, &mut d);
+    let run = pipeline::prepare(&mut session.map, file, overrides, arguments.analysis, &mut d);
     session.say(d);
     let Some(run) = run else { return Err(session.exit()) };
     if run.analyses > 1 && arguments.analysis.is_none() {

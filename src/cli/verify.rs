@@ -47,7 +47,7 @@ fn report(file: FileId, overrides: &Overrides, session: &mut Session) -> Result<
     let mut d = vec![];
     let bar = Bar::new(session.global.quiet);
     let progress = bar.clone();
-    let report = pipeline::verify(&session.map, file, overrides, &mut d, |settings| {
+    let report = pipeline::verify(&mut session.map, file, overrides, &mut d, |settings| {
         settings.interrupt = Some(watch::stop_flag());
         if let Some(bar) = progress {
             settings.progress = Some(Arc::new(move |part| bar.show(part)));

@@ -80,6 +80,9 @@ pub const CODES: &[Code] = &[
     row("E0225", "a memory in what is observed", "Looking must not change a model: functions with memory and waveforms need a signal of their own, which can then be observed."),
     row("E0226", "time is not positive", "The end of a run and its output interval are positive times."),
     row("E0227", "input is not driven", "A run needs to know what each input gets: `drive NAME = …` in the file, or --drive on the command line. Checking and converting take it as 0."),
+    row("E0250", "argument out of its range", "The argument of the function must be above 0, or not below 0, as the message says: a time constant, a frequency, a duration."),
+    row("E0251", "abscissae of a table do not rise", "A table says one value for each abscissa, in rising order; between them it goes in straight lines, beyond them it holds its end values."),
+    row("E0252", "file of a table cannot be read", "A table's file has two columns of numbers in SI, separated by commas (or semicolons, or blanks). A first line without numbers is a header; a unit in square brackets in it holds for its column. Lines that begin with `#` are skipped."),
     row("W0201", "input is not driven", "The input is taken as 0. `drive NAME = …` says what it gets; a simulation needs it."),
     // -- 03: units and domains
     row("E0301", "unknown unit", "A name right after a number, with at most one blank between, is its unit. Known are the units of the SI with its prefixes and bar, psi, L, min, h, rpm, rev, deg, inch, g, Ohm, degC and %; a product needs a `*`."),

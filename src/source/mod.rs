@@ -83,6 +83,23 @@ impl SourceMap {
         self.files.get(id.0 as usize)
     }
 
+    /// The first text of a name.
+    pub fn find(&self, name: &str) -> Option<FileId> {
+        self.files.iter().position(|file| file.name == name).map(|at| FileId(at as u32))
+    }
+
+    /// The path of a file that another one names: relative ones count from the folder of the one that names them.
+    pub fn beside(&self, file: FileId, path: &str) -> String {
+        let folder = self
+            .file(file)
+            .filter(|file| !file.name.starts_with('<'))
+            .and_then(|file| std::path::Path::new(&file.name).parent());
+        match folder {
+            Some(folder) => folder.join(path).to_string_lossy().into_owned(),
+            None => path.to_string(),
+        }
+    }
+
     /// The text of a span; empty for [`Span::NONE`].
     pub fn text(&self, span: Span) -> &str {
         self.file(span.file)

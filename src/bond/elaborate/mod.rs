@@ -9,7 +9,10 @@ mod structure;
 mod parameters;
 mod value;
 mod reading;
+mod functions;
 mod call;
+mod dynamics;
+mod tables;
 mod signals;
 mod laws;
 mod dimensions;
@@ -23,6 +26,7 @@ mod tests;
 
 pub use experiment::require_drives;
 pub use observe::observables;
+pub use tables::load_tables;
 
 use super::graph::BondGraph;
 use super::syntax::File;

@@ -6,10 +6,11 @@ use crate::bond::syntax::{
     Argument, Chain, ChainEnd, Expr as Syntax, File, Name, ObserveItem, Part, Path, StatementKind,
 };
 use crate::diagnostic::Diagnostic;
-use crate::expr::Expr as Tree;
+use crate::expr::{Expr as Tree, Table};
 use crate::quantity::nearest;
-use crate::source::{SourceMap, Span};
+use crate::source::{FileId, SourceMap, Span};
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 /// What a name of the space of values means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +58,10 @@ pub(super) struct Scope<'a> {
     /// Words of statements that could not be read, and names of elements of unknown kind: what is missing because of
     /// them needs no second error.
     pub excused: HashSet<&'a str>,
+    /// Names that hidden signals cannot take, with the last number tried behind each; filled by the first of them.
+    pub hidden: HashMap<String, u32>,
+    /// Tables that were read from files.
+    pub tables: HashMap<FileId, Option<Arc<Table>>>,
     /// Whether a parameter's value is known, by parameter.
     pub evaluated: Vec<bool>,
     /// The dimension of each parameter's value.
@@ -84,6 +89,8 @@ impl<'a> Scope<'a> {
             options: vec![],
             observe: vec![],
             excused: HashSet::new(),
+            hidden: HashMap::new(),
+            tables: HashMap::new(),
             evaluated: vec![],
             parameter_dimensions: vec![],
             signal_dimensions: vec![],

@@ -1,12 +1,12 @@
 //! Signals: their laws, the hidden ones that functions with memory bring along, and loops.
 
-use super::call::{DYNAMICS, Signature, WAVEFORMS, signature};
+use super::functions::{self, Signature};
 use super::scope::{Meaning, Scope, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
-use crate::bond::syntax::{self, Call, Part, Value, parse_drive};
+use crate::bond::syntax::{self, Part, parse_drive};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Expr as Tree, Function, Node};
+use crate::expr::{Expr as Tree, Node};
 use crate::quantity::nearest;
 use crate::source::Span;
 
@@ -39,207 +39,32 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<SignalLaw> {
         if let Node::Leaf(syntax::Leaf::Call(call)) = &*value.node {
-            let name = call.name.text.as_str();
-            if signature(WAVEFORMS, name).is_some() || signature(DYNAMICS, name).is_some() {
-                return self.signal_call(id, call, value.span, statement, d);
+            let row = functions::find(&call.name.text).filter(|row| Signature::changes(row));
+            if let Some(row) = row {
+                return self.signal_call(id, call, row, value.span, statement, d);
             }
         }
         let owner = self.graph.signals[id.index()].name.clone();
         self.lower(value, Place::free(&owner, statement), d).map(SignalLaw::Algebraic)
     }
 
-    /// The law of a signal that is one call of a waveform or a function with memory.
-    pub fn signal_call(
-        &mut self,
-        id: SignalId,
-        call: &Call,
-        span: Span,
-        statement: usize,
-        d: &mut Vec<Diagnostic>,
-    ) -> Option<SignalLaw> {
-        let name = call.name.text.as_str();
-        if name == "pwl" {
-            return self.pwl(call, span, d).map(SignalLaw::Waveform);
-        }
-        if let Some(row) = signature(WAVEFORMS, name) {
-            return self.waveform(call, row, span, d).map(SignalLaw::Waveform);
-        }
-        let row = signature(DYNAMICS, name)?;
-        let given = self.arguments(call, row, span, d)?;
-        let owner = self.graph.signals[id.index()].name.clone();
-        let mut failed = false;
-        let mut values = vec![];
-        for (argument, value) in row.arguments.iter().zip(given) {
-            let starts = matches!(*argument, "ic" | "z0");
-            let place = if starts {
-                Place::constant("an initial value")
-            } else {
-                Place::free(&owner, statement)
-            };
-            let lowered = value.map(|value| self.lower(value, place, d));
-            failed |= matches!(lowered, Some(None));
-            values.push(lowered.flatten());
-        }
-        if failed {
-            return None;
-        }
-        let this = Tree::new(Node::Leaf(Leaf::Signal(id)), span);
-        let mut values = values.into_iter();
-        let mut next = || values.next().flatten();
-        let x = next()?;
-        Some(match name {
-            "integ" => SignalLaw::Integrator {
-                rate: x,
-                initial: Initial::Given(next().unwrap_or(Tree::number(0.0))),
-            },
-            "lag" => {
-                let tau = next()?;
-                let initial = next().map_or(Initial::Implied, Initial::Given);
-                SignalLaw::Integrator { rate: (x - this) / tau, initial }
-            }
-            _ => {
-                // u = Kp·x + z, y = clamp(u, lo, hi), z' = Ki·x + Kaw·(y − u).
-                let (kp, ki, lo, hi, kaw, z0) = (next(), next(), next(), next(), next(), next());
-                if kp.is_none() && ki.is_none() {
-                    d.push(
-                        Diagnostic::error("E0216", span, "`pi` has neither `Kp` nor `Ki`")
-                            .says("a regulator without a gain")
-                            .help("as in `pi(x, Kp = 2, Ki = 10)`"),
-                    );
-                    return None;
-                }
-                let state = ki.as_ref().map(|_| self.hide(&owner, "z", span, statement));
-                let z = state.map(|id| Tree::new(Node::Leaf(Leaf::Signal(id)), span));
-                let proportional = kp.map(|kp| kp * x.clone());
-                let u = match (proportional, z) {
-                    (Some(a), Some(z)) => a + z,
-                    (Some(only), None) | (None, Some(only)) => only,
-                    (None, None) => return None,
-                };
-                let limited = lo.is_some() || hi.is_some();
-                if let (Some(state), Some(ki)) = (state, ki) {
-                    let mut rate = ki * x;
-                    if let (Some(kaw), true) = (kaw, limited) {
-                        rate = rate + kaw * (this - u.clone());
-                    }
-                    let initial = Initial::Given(z0.unwrap_or(Tree::number(0.0)));
-                    self.graph.signals[state.index()].law = SignalLaw::Integrator { rate, initial };
-                }
-                let mut y = match (lo, hi) {
-                    (Some(lo), Some(hi)) => Tree::call(Function::Clamp, vec![u, lo, hi]),
-                    (Some(lo), None) => Tree::call(Function::Max, vec![u, lo]),
-                    (None, Some(hi)) => Tree::call(Function::Min, vec![u, hi]),
-                    (None, None) => u,
-                };
-                y.span = span;
-                SignalLaw::Algebraic(y)
-            }
-        })
-    }
-
-    fn waveform(
-        &mut self,
-        call: &Call,
-        row: &Signature,
-        span: Span,
-        d: &mut Vec<Diagnostic>,
-    ) -> Option<Waveform> {
-        let place = Place::constant("a waveform's argument");
-        let given = self.arguments(call, row, span, d)?;
-        let lowered: Vec<Option<Expr>> = given
-            .into_iter()
-            .map(|value| match value {
-                Some(value) => self.lower(value, place, d),
-                None => Some(Tree::number(0.0)),
-            })
-            .collect();
-        let mut lowered = lowered.into_iter().collect::<Option<Vec<_>>>()?.into_iter();
-        let mut next = || lowered.next();
-        Some(match row.name {
-            "step" => Waveform::Step { at: next()?, before: next()?, after: next()? },
-            "ramp" => Waveform::Ramp { at: next()?, slope: next()? },
-            "pulse" => Waveform::Pulse {
-                low: next()?,
-                high: next()?,
-                delay: next()?,
-                rise: next()?,
-                fall: next()?,
-                width: next()?,
-                period: next()?,
-            },
-            _ => Waveform::Sine {
-                offset: next()?,
-                amplitude: next()?,
-                frequency: next()?,
-                delay: next()?,
-                damping: next()?,
-                phase: next()?,
-            },
-        })
-    }
-
-    /// `pwl(t0, y0; t1, y1; …)`
-    fn pwl(&mut self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Waveform> {
-        let what = "a waveform's argument";
-        let form = |span, message: &str| {
-            Diagnostic::error("E0216", span, message)
-                .help("its form is `pwl(t0, y0; t1, y1; …)`, each point a time and a value")
-        };
-        let mut points = vec![];
-        let mut last = f64::NEG_INFINITY;
-        let mut failed = false;
-        for row in &call.rows {
-            let (t, y) = match row.as_slice() {
-                [t, y] if t.label.is_none() && y.label.is_none() => match (&t.value, &y.value) {
-                    (Value::Expr(t), Value::Expr(y)) => (t, y),
-                    _ => {
-                        d.push(form(t.span.join(y.span), "a point of `pwl` is two values"));
-                        return None;
-                    }
-                },
-                _ => {
-                    let at =
-                        row.iter().map(|argument| argument.span).reduce(Span::join).unwrap_or(span);
-                    let says = match row.len() {
-                        1 => "only one value".to_string(),
-                        n => format!("{n} values"),
-                    };
-                    d.push(form(at, "a point of `pwl` is a time and a value").says(says));
-                    return None;
-                }
-            };
-            let place = Place::constant(what);
-            let (time, value) = (self.lower(t, place, d), self.lower(y, place, d));
-            if let Some(at) = time.as_ref().and_then(|time| self.evaluate(time, what, t.span, d)) {
-                if at < last {
-                    d.push(
-                        form(t.span, "the times of `pwl` must not decrease")
-                            .says("earlier than the point before"),
-                    );
-                    failed = true;
-                }
-                last = at;
-            }
-            match (time, value) {
-                (Some(time), Some(value)) => points.push((time, value)),
-                _ => failed = true,
-            }
-        }
-        (!failed).then_some(Waveform::Pwl(points))
-    }
-
     /// A new hidden signal that belongs to `owner`.
     pub fn hide(&mut self, owner: &str, part: &str, span: Span, statement: usize) -> SignalId {
         let id = SignalId(self.graph.signals.len() as u32);
-        let taken = |name: &str| {
-            self.values.contains_key(name) || self.graph.signals.iter().any(|s| s.name == name)
-        };
-        let mut name = format!("{owner}_{part}");
-        let mut count = 1;
-        while taken(&name) {
-            count += 1;
-            name = format!("{owner}_{part}{count}");
+        if self.hidden.is_empty() {
+            let all = self.graph.signals.iter().map(|signal| signal.name.as_str());
+            let all = all.chain(self.values.keys().copied());
+            self.hidden = all.map(|name| (name.to_string(), 1)).collect();
         }
+        let base = format!("{owner}_{part}");
+        let mut count = self.hidden.get(&base).copied().unwrap_or(0);
+        let mut name = base.clone();
+        while count > 0 && self.hidden.contains_key(&name) {
+            count += 1;
+            name = format!("{base}{count}");
+        }
+        self.hidden.insert(base, count.max(1));
+        self.hidden.insert(name.clone(), 1);
         self.graph.signals.push(Signal {
             name,
             law: SignalLaw::Algebraic(Tree::number(0.0)),

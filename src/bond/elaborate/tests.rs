@@ -393,6 +393,77 @@ fn signals_and_hidden_ones() {
 }
 
 #[test]
+fn transfer_functions_are_chains_of_the_size_of_their_input() {
+    let graph = graph(&around(
+        "param T = 2 s\nsignal a = tf([1e20], [1e20, 3e20, 2e20], f(m))\nsignal b = tf([3], [T, 1], f(m))\n\
+         signal c = tf([1, 2], [2], f(m)*0 + time)\nsignal k = tf([2], [4, 0, 0], f(m))",
+    )
+    .replace("signal c = tf([1, 2], [2], f(m)*0 + time)", "signal c = tf([1, 2], [1, 0, 4], time)"));
+    for (name, law) in [
+        ("a_x1", "integ((0.6666666666666666*a_x2), 0)"),
+        ("a_x2", "integ((3*((f(U -> m)-a_x1)-a_x2)), 0)"),
+        ("a", "(0.5*a_x1)"),
+        ("b_x1", "integ((0.5*(f(U -> m)-(((1/T)/0.5)*b_x1))), 0)"),
+        ("b", "(((3/T)/0.5)*b_x1)"),
+        ("c_x1", "integ((2*c_x2), 0)"),
+        ("c_x2", "integ((2*(time-c_x1)), 0)"),
+        ("c", "((0.5*c_x1)+(0.5*c_x2))"),
+        ("k_x1", "integ(k_x2, 0)"),
+        ("k", "(0.5*k_x1)"),
+    ] {
+        assert_eq!(algebraic(&graph, name), law, "{name}");
+    }
+}
+
+/// A table that reads `points.csv` with this content.
+fn with_file(content: &str) -> Built {
+    let mut map = SourceMap::default();
+    let text = around("signal y = table(f(m), file(\"points.csv\"))");
+    let file = map.add("models/test.bg", text);
+    map.add("models/points.csv", content);
+    let mut d = vec![];
+    let file = syntax::parse(&map, file, &mut d);
+    load_tables(&file, &mut map, &mut d);
+    let graph = elaborate(&file, &map, &Overrides::default(), &mut d);
+    Built { graph, d, map }
+}
+
+#[test]
+fn tables_from_files() {
+    for content in [
+        "0,1\n1,2.5\n4,-1e3\n",
+        "x, y\r\n0;1\r\n1;2.5\r\n4;-1e3",
+        "# points\n\n\"x [m]\"\ty\n0 1\n 1\t 2.5\n4   -1e3\n",
+    ] {
+        let built = with_file(content);
+        assert_eq!(built.d, [], "{content}");
+        let graph = built.graph.unwrap();
+        let SignalLaw::Algebraic(law) = &signal(&graph, "y").law else { panic!() };
+        let Node::Table(_, table) = &*law.node else { panic!() };
+        assert_eq!((&table.x[..], &table.y[..]), (&[0.0, 1.0, 4.0][..], &[1.0, 2.5, -1e3][..]));
+    }
+    let scaled = with_file("x [mm], y [bar]\n0,1\n1000,2\n").graph.unwrap();
+    let SignalLaw::Algebraic(law) = &signal(&scaled, "y").law else { panic!() };
+    let Node::Table(_, table) = &*law.node else { panic!() };
+    assert_eq!((&table.x[..], &table.y[..]), (&[0.0, 1.0][..], &[1e5, 2e5][..]));
+    for (content, error, line) in [
+        ("x,y\n", "E0252", 1),
+        ("0,1\n2\n", "E0252", 2),
+        ("0,1\n1,2,3\n", "E0252", 2),
+        ("0,1\n\n1,two\n", "E0252", 3),
+        ("0,1\n1,inf\n", "E0252", 2),
+        ("0,1\n0,2\n", "E0251", 2),
+        ("0,1\n-1,2\n", "E0251", 2),
+        ("x [nix], y\n0,1\n", "E0252", 1),
+    ] {
+        let built = with_file(content);
+        assert_eq!(built.d.len(), 1, "{content}: {:?}", built.lines());
+        let at = built.map.position(built.d[0].labels[0].span).unwrap();
+        assert_eq!((built.d[0].code, at.0), (error, line), "{content}");
+    }
+}
+
+#[test]
 fn waveforms_within_elements_are_hidden_signals() {
     let graph = graph("Se:U(2*step(1, 0, 5)) -> R:r(1)");
     assert_eq!(law_of(&graph, "U"), "Effort (2*U_step)");
@@ -415,6 +486,11 @@ fn ready_laws_are_what_the_reference_says() {
         };
         law.evaluate(&mut |_| x)
     };
+    // Far out the soft corner of `relief` is the straight line, and nothing overflows.
+    for x in [1e300, -1e300f64] {
+        let line = x / 50.0 + (x - 3.0 * x.signum());
+        assert!((at("c", x) / line - 1.0).abs() < 1e-12, "{x}");
+    }
     for x in [-50.0, -3.0, -0.1, 0.0, 0.3, 2.0, 80.0f64] {
         // Δp = C²·Q·√(Q² + Q0²)
         let q = at("a", x);
@@ -661,7 +737,29 @@ fn readings() {
 
 #[test]
 fn functions_and_signals() {
-    errors(&around("signal x = pwm(0.5, 1)"), &["E0222 pwm"]);
+    errors(&around("signal x = sample(0.5, 1)"), &["E0222 sample"]);
+    for (call, at) in [
+        ("pwm(0.5, 0)", "0"),
+        ("pwm(0.5, -2*1)", "-2*1"),
+        ("lag(f(m), 0)", "0"),
+        ("der(f(m), -1 s)", "-1 s"),
+        ("leadlag(f(m), 1, 0)", "0"),
+        ("pid(f(m), Kp = 1, Kd = 1, tau = 0)", "0"),
+        ("pulse(0, 1, 0, 0, 0, -1, 2)", "-1"),
+    ] {
+        errors(&around(&format!("signal x = {call}")), &[&format!("E0250 {at}")]);
+    }
+    errors(&around("signal x = pid(f(m), Kp = 1, Kd = 1)"), &["E0216 pid(f(m), Kp = 1, Kd = 1)"]);
+    errors(&around("signal x = pid(f(m), lo = 1)"), &["E0216 pid(f(m), lo = 1)"]);
+    errors(&around("signal x = pwm(0.5, time)"), &["E0211 time"]);
+    errors(&around("signal x = tf([1, 2, 3], [1, 2], f(m))"), &["E0216 [1, 2, 3]"]);
+    errors(&around("signal x = tf([1], [0, 0], f(m))"), &["E0216 [0, 0]"]);
+    errors(&around("signal x = tf([1; 2], [1, 1], f(m))"), &["E0216 [1; 2]"]);
+    errors(&around("signal x = tf(1, 2, f(m))"), &["E0216 tf(1, 2, f(m))"]);
+    errors(&around("signal x = tf([time], [1, 1], f(m))"), &["E0211 time"]);
+    let near = errors(&around("signal x = leadlg(f(m), 1, 1)"), &["E0210 leadlg"]);
+    assert_eq!(near.d[0].notes, ["its form is `leadlag(x, t_lead, t_lag)`"]);
+    errors(&around("signal x = file(\"a.csv\")"), &["E0210 file"]);
     errors(&around("signal x = itneg(f(m))"), &["E0210 itneg"]);
     errors(&around("signal x = lag(f(m))"), &["E0216 lag(f(m))"]);
     errors(&around("signal x = pi(f(m), kp = 2)"), &["E0216 kp = 2"]);
@@ -669,8 +767,8 @@ fn functions_and_signals() {
     errors(&around("signal x = pwl(0, 1; 2)"), &["E0216 2"]);
     errors(&around("signal x = pwl(1, 1; 0, 2)"), &["E0216 0"]);
     errors(&around("signal x = step(time, 0, 1)"), &["E0211 time"]);
-    errors(&around("signal x = table(time, [1, 2; 0, 1])"), &["E0216 0"]);
-    errors(&around("signal x = table(time, file(\"a.csv\"))"), &["E0222 file(\"a.csv\")"]);
+    errors(&around("signal x = table(time, [1, 2; 0, 1])"), &["E0251 0"]);
+    errors(&around("signal x = table(time, file(\"a.csv\"))"), &["E0901 \"a.csv\""]);
     let ring = errors(&around("signal a = b + 1\nsignal b = 2*c\nsignal c = a"), &["E0408 a"]);
     assert_eq!(ring.d[0].notes, ["the loop is `a` → `b` → `c` → `a`"]);
     errors(&around("signal a = a"), &["E0408 a"]);

@@ -10,7 +10,9 @@ mod parse;
 mod statement;
 mod expression;
 mod expected;
+mod data;
 
+pub use data::data_files;
 pub use parse::{parse, parse_drive, parse_observe, parse_value};
 pub use scan::STATEMENT_WORDS;
 pub use tree::{
