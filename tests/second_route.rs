@@ -20,7 +20,7 @@ fn graph(model: &str, overrides: &Overrides) -> BondGraph {
     let id = map.add(model, file(&format!("models/{model}.bg")));
     let mut d = vec![];
     let text = parse(&map, id, &mut d);
-    match elaborate(&text, &map, overrides, &mut d) {
+    match elaborate(&text.into(), &map, overrides, &mut d) {
         Some(graph) => graph,
         None => panic!("{model}: {d:#?}"),
     }

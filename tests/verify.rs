@@ -21,7 +21,7 @@ fn translated(model: &str) -> (BondGraph, Causality, Netlist) {
     let file = map.add(model, std::fs::read_to_string(path).unwrap());
     let mut d: Vec<Diagnostic> = vec![];
     let syntax = parse(&map, file, &mut d);
-    let result = elaborate(&syntax, &map, &Overrides::default(), &mut d).and_then(|graph| {
+    let result = elaborate(&syntax.into(), &map, &Overrides::default(), &mut d).and_then(|graph| {
         let causality = assign(&graph, &mut d)?;
         let initial = initial::solve(&graph, &causality, &mut d)?;
         let translation = translate(&graph, &causality, &initial, &map, &mut d)?;

@@ -26,6 +26,9 @@ pub struct ModelFlags {
     /// Output interval: 1ms
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub step: Option<String>,
+    /// A folder in which imports are looked for, after that of the file that imports (repeatable)
+    #[arg(short = 'I', value_name = "DIR")]
+    pub include: Vec<String>,
 }
 
 /// Flags of a command that reads a model and writes a result as text or JSON.
@@ -57,6 +60,7 @@ impl ModelFlags {
             until: self.until.clone(),
             step: self.step.clone(),
             options: pairs("--option", &self.option, session)?,
+            folders: self.include.clone(),
         })
     }
 }

@@ -73,10 +73,11 @@ pub fn graph(
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
-    let syntax = syntax::parse(map, file, d);
-    check_options(&syntax, overrides, d);
-    elaborate::load_tables(&syntax, map, d);
-    elaborate::elaborate(&syntax, map, overrides, d)
+    let program = elaborate::load(map, file, &overrides.folders, d);
+    if let Some(syntax) = program.files.first() {
+        check_options(syntax, overrides, d);
+    }
+    elaborate::elaborate(&program, map, overrides, d)
 }
 
 /// Checks the options of a file and of the command line, each at its place.

@@ -57,7 +57,7 @@ pub fn translated(model: &Path, overrides: &Overrides) -> Translated {
         map.add(format!("models/{}", model.display()), std::fs::read_to_string(path).unwrap());
     let mut d = vec![];
     let parsed = syntax::parse(&map, file, &mut d);
-    let graph = elaborate::elaborate(&parsed, &map, overrides, &mut d);
+    let graph = elaborate::elaborate(&parsed.into(), &map, overrides, &mut d);
     let graph = graph.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
     let causality = causality::assign(&graph, &mut d);
     let causality = causality.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));

@@ -42,7 +42,7 @@ impl Scope<'_> {
             return self.reading(call, span, d);
         }
         let Some(row) = row else {
-            if !self.excused.contains(name) {
+            if !self.excused(name) {
                 d.push(self.unknown_call(call));
             }
             return None;
@@ -88,7 +88,7 @@ impl Scope<'_> {
             .says("cannot be used yet");
         }
         let error = Diagnostic::error("E0210", span, format!("unknown function `{name}`"));
-        if self.values.contains_key(name) {
+        if self.value(name).is_some() {
             return error.says("a parameter or signal").help("write a product with `*`");
         }
         if name == "file" {

@@ -3,7 +3,8 @@
 //! A bare number is dimensionless as a factor, dividend, divisor or exponent; as a whole value its unit is unknown,
 //! which agrees with anything. Nothing is checked here.
 
-use super::scope::{Meaning, Scope};
+use super::frames::{Thing, name_alone};
+use super::scope::{Meaning, Scope, Valued};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Call, Path, Value};
@@ -86,7 +87,8 @@ impl Scope<'_> {
         for _ in 0..self.parameters.len().min(64) {
             let mut changed = false;
             for k in 0..self.parameters.len() {
-                let found = self.dimension(self.parameters[k].value, None).whole();
+                let Some(Valued { value, here, .. }) = self.parameters[k] else { continue };
+                let found = self.at(here, |scope| scope.dimension(value, None)).whole();
                 if found != Dim::Unknown && self.parameter_dimensions[k] == Dim::Unknown {
                     self.parameter_dimensions[k] = found;
                     changed = true;
@@ -103,19 +105,20 @@ impl Scope<'_> {
         self.signal_dimensions = vec![Dim::Unknown; self.graph.signals.len()];
         for _ in 0..self.signals.len().min(64) {
             let mut changed = false;
-            let drives = self.drives.iter().filter_map(|(name, valued)| {
-                match self.values.get(name.text.as_str()) {
-                    Some(Meaning::Signal(id)) => Some((id.index(), valued.value)),
-                    _ => None,
+            let mut values: Vec<(usize, Valued<'_>)> = vec![];
+            values.extend(
+                self.signals.iter().enumerate().filter_map(|(k, valued)| Some((k, (*valued)?))),
+            );
+            for at in 0..self.drives.len() {
+                let (name, valued) = self.drives[at];
+                let meaning =
+                    self.at(valued.here, |scope| scope.key(name).and_then(|key| scope.value(&key)));
+                if let Some(Meaning::Signal(id)) = meaning {
+                    values.push((id.index(), valued));
                 }
-            });
-            let own = self.signals.iter().enumerate();
-            let own = own.filter_map(|(k, valued)| Some((k, valued.as_ref()?.value)));
-            let found: Vec<(usize, Dim)> = own
-                .chain(drives)
-                .map(|(k, value)| (k, self.dimension(value, None).whole()))
-                .collect();
-            for (k, dim) in found {
+            }
+            for (k, valued) in values {
+                let dim = self.at(valued.here, |scope| scope.dimension(valued.value, None)).whole();
                 if dim != Dim::Unknown && self.signal_dimensions[k] == Dim::Unknown {
                     self.signal_dimensions[k] = dim;
                     changed = true;
@@ -171,7 +174,7 @@ impl Scope<'_> {
             }
             _ => {}
         }
-        match self.values.get(path.name.text.as_str()) {
+        match self.look_up_value(path).map(|(meaning, _)| meaning) {
             Some(Meaning::Parameter(id)) => self.parameter_dimensions[id.index()],
             Some(Meaning::Signal(id)) => {
                 self.signal_dimensions.get(id.index()).copied().unwrap_or(Dim::Unknown)
@@ -245,20 +248,20 @@ impl Scope<'_> {
 
     /// The bond that a reading reads, when it can be found without an error.
     fn read_bond(&self, call: &Call) -> Option<BondId> {
-        let find = |path: &Path| self.vertices.get(path.name.text.as_str()).copied();
         match &call.rows.first()?.first()?.value {
             Value::Bond(from, to) => {
-                let (from, to) = (find(from)?, find(to)?);
-                self.graph.bond_ids().find(|bond| {
-                    let bond = self.graph.bond(*bond);
-                    bond.from.vertex == from && bond.to.vertex == to
-                })
+                let (from, to) = (self.look_up(from)?.thing, self.look_up(to)?.thing);
+                self.bonds_between(from, to).first().copied()
             }
             Value::Expr(expr) => {
-                let Node::Leaf(syntax::Leaf::Name(path)) = &*expr.node else { return None };
-                let id = find(path)?;
+                let found = self.look_up(name_alone(expr)?)?;
+                let id = match found.thing {
+                    Thing::Vertex(id) => id,
+                    Thing::Port(port) => return self.ports[port.0 as usize].bond,
+                    Thing::Instance(_) => return None,
+                };
                 let bonds = &self.graph.vertex(id).bonds;
-                let second = path.members.first().is_some_and(|member| member.text == "2");
+                let second = found.rest.first().is_some_and(|member| member.text == "2");
                 bonds.get(usize::from(second)).copied()
             }
             _ => None,
@@ -283,10 +286,10 @@ impl Scope<'_> {
                 clues.push((clue, dimension));
             }
         };
-        let name = declaration.name.text.as_str();
         let Some(arguments) = declaration.arguments.filter(|arguments| !arguments.is_empty())
         else {
-            if let Some(Meaning::Parameter(parameter)) = self.values.get(name) {
+            let meaning = self.key(declaration.name).and_then(|key| self.value(&key));
+            if let Some(Meaning::Parameter(parameter)) = meaning {
                 add(linear, self.parameter_dimensions[parameter.index()]);
             }
             return clues;

@@ -1,6 +1,7 @@
 //! Domains of bonds: from the units of elements, along junctions and two-ports.
 
 use super::dimensions::Dim;
+use super::frames::Here;
 use super::scope::{Meaning, Scope};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
@@ -16,6 +17,12 @@ impl Scope<'_> {
         // Laws may speak of readings whose domains follow only later: ask the elements again until nothing new comes.
         // Only then what two domains share is taken for the likelier one: kelvins are pseudo-thermal beside watts.
         let mut guess = false;
+        for at in 0..self.ports.len() {
+            let port = &self.ports[at];
+            if let (Some((domain, _)), Some(bond)) = (port.domain, port.bond) {
+                self.settle(bond, domain, &mut settled);
+            }
+        }
         loop {
             let before = settled.len();
             for id in self.graph.vertex_ids().collect::<Vec<_>>() {
@@ -37,6 +44,7 @@ impl Scope<'_> {
                 }
             }
             if settled.len() == before && std::mem::replace(&mut guess, true) {
+                self.here = Here::ROOT;
                 return;
             }
         }
@@ -52,6 +60,7 @@ impl Scope<'_> {
 
     /// Asks a one-port for the domain of its bond. Whether it needs no asking again.
     fn ask(&mut self, id: VertexId, guess: bool, settled: &mut Vec<BondId>) -> bool {
+        self.here = self.declarations[id.index()].here;
         let Some(&bond) = self.graph.vertex(id).bonds.first() else { return true };
         if self.declarations[id.index()].element.shape.is_junction()
             || self.graph.bond(bond).domain != Domain::Any
@@ -87,6 +96,7 @@ impl Scope<'_> {
         }
         let first = bonds[0] == bond;
         let other = bonds[usize::from(first)];
+        self.here = self.declarations[end.vertex.index()].here;
         let Some((ratio, gain)) = self.ratio(end.vertex) else { return };
         if let Some(domain) = across(shape, domain, first, ratio, gain) {
             self.settle(other, domain, settled);
@@ -97,7 +107,7 @@ impl Scope<'_> {
     fn ratio(&self, id: VertexId) -> Option<(Dimension, bool)> {
         let declaration = &self.declarations[id.index()];
         let Some(argument) = declaration.arguments.and_then(|arguments| arguments.first()) else {
-            let meaning = self.values.get(declaration.name.text.as_str())?;
+            let meaning = self.key(declaration.name).and_then(|key| self.value(&key))?;
             let Meaning::Parameter(parameter) = meaning else { return None };
             return Some((self.parameter_dimensions[parameter.index()].known()?, false));
         };

@@ -82,15 +82,22 @@ impl Scope<'_> {
     pub fn make_laws(&mut self, d: &mut Vec<Diagnostic>) {
         for k in 0..self.declarations.len() {
             let declaration = self.declarations[k];
-            if let Some(law) = self.law(&declaration, d) {
+            let name = self.graph.vertices[k].name.clone();
+            if let Some(law) = self.at(declaration.here, |scope| scope.law(&declaration, &name, d))
+            {
                 self.graph.vertices[k].law = law;
             }
         }
     }
 
-    fn law(&mut self, declaration: &Declaration<'_>, d: &mut Vec<Diagnostic>) -> Option<Law> {
+    fn law(
+        &mut self,
+        declaration: &Declaration<'_>,
+        name: &str,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Law> {
         let shape = declaration.element.shape;
-        let (name, statement) = (declaration.name.text.as_str(), declaration.statement);
+        let statement = declaration.statement;
         let sorted = self.sort(declaration, d)?;
         let kind = match shape {
             Shape::Compliance => Storage::Compliance,
@@ -192,11 +199,13 @@ impl Scope<'_> {
 
     /// The value of an element without arguments: the parameter or signal of its name.
     fn implied(&mut self, declaration: &Declaration<'_>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
-        let (name, span) = (declaration.name.text.as_str(), declaration.name.span);
-        let leaf = match self.values.get(name) {
-            Some(Meaning::Parameter(id)) => Leaf::Parameter(*id),
-            Some(Meaning::Signal(id)) => Leaf::Signal(*id),
-            None if self.excused.contains(name) => return None,
+        let span = declaration.name.span;
+        let key = self.key(&declaration.name)?;
+        let name = &*key;
+        let leaf = match self.value(name) {
+            Some(Meaning::Parameter(id)) => Leaf::Parameter(id),
+            Some(Meaning::Signal(id)) => Leaf::Signal(id),
+            None if self.excused(&declaration.name.text) => return None,
             None => {
                 let kind = declaration.element.kind;
                 let error = Diagnostic::error(
@@ -205,7 +214,8 @@ impl Scope<'_> {
                     format!("the {} `{name}` has no value", declaration.element.noun),
                 )
                 .says(format!("no argument, and no parameter or signal is called `{name}`"));
-                let mut names: Vec<&str> = self.values.keys().copied().collect();
+                let mut names: Vec<&str> =
+                    self.frame().values.keys().map(|name| name.as_ref()).collect();
                 names.sort_unstable();
                 d.push(match nearest(name, names) {
                     Some(meant) => error.help(format!(

@@ -4,7 +4,10 @@
 //! joined, parameters evaluated, domains follow from their units along the bonds; then laws and signals, and at last
 //! what is observed. Each step goes on after an error as far as it can.
 
+mod program;
 mod scope;
+mod frames;
+mod expand;
 mod structure;
 mod parameters;
 mod value;
@@ -19,19 +22,19 @@ mod dimensions;
 mod domains;
 mod experiment;
 mod observe;
-mod later;
 
 #[cfg(test)]
 mod tests;
 
+pub use expand::MOST_PARTS;
 pub use experiment::require_drives;
 pub use observe::observables;
-pub use tables::load_tables;
+pub use program::{Program, load};
 
 use super::graph::BondGraph;
-use super::syntax::File;
+use super::syntax;
 use crate::diagnostic::{Diagnostic, has_errors};
-use crate::source::SourceMap;
+use crate::source::{SourceMap, Span};
 
 /// What the command line says instead of the file.
 #[derive(Clone, Debug, Default)]
@@ -48,22 +51,30 @@ pub struct Overrides {
     pub step: Option<String>,
     /// `--option`: keys and values; they come after the file's.
     pub options: Vec<(String, String)>,
+    /// `-I`: folders in which imports are looked for.
+    pub folders: Vec<String>,
 }
 
-/// Makes the graph of a file. `None` when anything was wrong; errors in `d` of an earlier stage count too, since a
-/// statement that could not be read leaves a hole.
+/// Makes the graph of a program: its first file, and what that imports. `None` when anything was wrong; errors in `d`
+/// of an earlier stage count too, since a statement that could not be read leaves a hole.
 pub fn elaborate(
-    file: &File,
+    program: &Program,
     map: &SourceMap,
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
-    if later::refuse(file, d) {
-        return None;
+    let mut set = vec![];
+    for (name, text) in &overrides.set {
+        let before = d.len();
+        let value = syntax::parse_value(text, Span::NONE.file, d);
+        for error in &mut d[before..] {
+            error.notes.push(format!("in the value that was set: {name}={text}"));
+        }
+        set.push((name.clone(), text.clone(), value));
     }
-    let mut scope = scope::Scope::collect(file, map, d);
+    let mut scope = scope::Scope::collect(program, map, &set, d);
     scope.join_bonds(d);
-    scope.evaluate_parameters(&overrides.set, d);
+    scope.evaluate_parameters(d);
     scope.infer_domains();
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);

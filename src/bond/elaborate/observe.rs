@@ -2,8 +2,9 @@
 
 use super::dimensions::Dim;
 use super::experiment::{is_name, si_text};
+use super::frames::Here;
 use super::reading::variable;
-use super::scope::Scope;
+use super::scope::{Meaning, Scope};
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{Expr as Syntax, ObserveItem, parse_observe};
@@ -59,7 +60,7 @@ impl Scope<'_> {
         let mut columns = vec![];
         let mut heads: HashMap<String, Span> = HashMap::new();
         for item in items {
-            if is_name(&item.expr, "all") && !self.values.contains_key("all") {
+            if is_name(&item.expr, "all") && self.value("all").is_none() {
                 let mut all = self.default_columns();
                 all.extend(observables(&self.graph));
                 for column in all {
@@ -182,10 +183,13 @@ impl Scope<'_> {
             all.filter(move |(_, signal)| signal.origin == origin).map(|(k, _)| SignalId(k as u32))
         };
         signals(SignalOrigin::Input).for_each(|id| add(signal_column(&self.graph, id)));
-        for name in &self.outputs {
-            let id = self.graph.signals.iter().position(|signal| signal.name == name.text);
-            if let Some(id) = id {
-                add(signal_column(&self.graph, SignalId(id as u32)));
+        for (name, here) in &self.outputs {
+            let frame = &self.frames[here.frame.0 as usize];
+            let at = |here: &Here| {
+                self.key_at(name, *here).and_then(|key| frame.values.get(&*key).copied())
+            };
+            if let Some(Meaning::Signal(id)) = at(here) {
+                add(signal_column(&self.graph, id));
             }
         }
         signals(SignalOrigin::Signal).for_each(|id| add(signal_column(&self.graph, id)));

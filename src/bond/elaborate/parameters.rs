@@ -1,114 +1,85 @@
-//! Parameters: overrides, order of evaluation, values.
+//! Parameters: values as they are needed, and what the command line sets.
 
 use super::dimensions::Dim;
-use super::scope::{Meaning, Scope, a, did_you_mean};
+use super::scope::{Mark, Scope, a, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
-use crate::bond::syntax::{self, parse_value};
+use crate::bond::syntax;
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
 use crate::quantity::{Unit, nearest};
 use crate::source::Span;
 
-/// How far the evaluation of a parameter has come.
-#[derive(Clone, Copy, PartialEq)]
-enum Mark {
-    Untouched,
-    /// On the way from the parameter that began to the one looked at.
-    Open,
-    Done,
-}
+/// Bounds and indices whose parameters have bounds and indices of their own, and so on.
+const MOST_DEMANDS: usize = 50;
 
 impl Scope<'_> {
-    /// Gives each parameter its expression and its value.
-    pub fn evaluate_parameters(&mut self, set: &[(String, String)], d: &mut Vec<Diagnostic>) {
-        let count = self.graph.parameters.len();
-        self.evaluated = vec![false; count];
-        self.parameter_dimensions = vec![Dim::Unknown; count];
-        let mut lowered = vec![false; count];
-        for (k, lowered) in lowered.iter_mut().enumerate() {
-            let value = self.parameters[k].value;
-            let place = Place::constant("a parameter");
-            if let Some(expr) = self.lower(value, place, d) {
-                self.graph.parameters[k].unit = unit_of(value);
-                self.graph.parameters[k].expr = expr;
-                *lowered = true;
-            }
+    /// Gives each parameter its expression and its value, and reports what was set and is no parameter.
+    pub fn evaluate_parameters(&mut self, d: &mut Vec<Diagnostic>) {
+        for k in 0..self.parameters.len() {
+            self.demand(k, d);
         }
-        let overridden = self.override_parameters(set, &mut lowered, d);
-        let mut marks = vec![Mark::Untouched; count];
-        for k in 0..count {
-            self.evaluate_parameter(k, &lowered, &mut marks, d);
-        }
+        self.parameter_dimensions = vec![Dim::Unknown; self.parameters.len()];
         self.infer_parameter_dimensions();
-        for (k, text, dimension) in overridden {
-            let declared = self.parameter_dimensions[k];
-            if let (Dim::Known(declared), Dim::Known(given)) = (declared, dimension)
-                && declared != given
-            {
-                let parameter = &self.graph.parameters[k];
-                d.push(
-                    Diagnostic::error(
-                        "E0303",
-                        Span::NONE,
-                        format!("`{text}` is not a value for `{}`", parameter.name),
-                    )
-                    .label(parameter.span, format!("its dimension is {declared}"))
-                    .because(format!("the dimension of `{text}` is {given}")),
-                );
-            }
+        for at in 0..self.set.len() {
+            self.check_setting(at, d);
         }
     }
 
-    fn override_parameters(
-        &mut self,
-        set: &[(String, String)],
-        lowered: &mut [bool],
-        d: &mut Vec<Diagnostic>,
-    ) -> Vec<(usize, String, Dim)> {
-        let mut overridden = vec![];
-        for (name, text) in set {
-            let Some(Meaning::Parameter(id)) = self.values.get(name.as_str()).copied() else {
-                let error = Diagnostic::error(
-                    "E0223",
+    /// What the command line sets must be a parameter's, and of its dimension.
+    fn check_setting(&mut self, at: usize, d: &mut Vec<Diagnostic>) {
+        let setting = &self.set[at];
+        let (name, text) = (setting.name, setting.text);
+        let Some(id) = setting.taken else {
+            let error = Diagnostic::error(
+                "E0223",
+                Span::NONE,
+                format!("no parameter is called `{name}`, so it cannot be set"),
+            );
+            let private = self.graph.parameters.iter().find(|parameter| parameter.name == name);
+            let signal = self.graph.signals.iter().any(|signal| signal.name == name);
+            let names = self.graph.parameters.iter().map(|p| p.name.as_str());
+            d.push(match (private, signal, nearest(name, names)) {
+                (Some(private), ..) => {
+                    let mut error = error.label(private.span, "private to its model");
+                    error.message = format!("`{name}` is private to its model and cannot be set");
+                    error.help("parameters in the brackets after a model's name can be set")
+                }
+                (_, true, _) => {
+                    error.help("signals and inputs are not set; `--drive` drives an input")
+                }
+                _ if self.element_named(name).is_some() => self.value_of_element(name, error),
+                (_, _, Some(meant)) => did_you_mean(error, Span::NONE, meant),
+                _ => error,
+            });
+            return;
+        };
+        let (Some(value), setting) = (setting.value, &self.set[at]) else { return };
+        let dimension = self.dimension(value, None);
+        let declared = match setting.declared {
+            Some(valued) => self.at(valued.here, |scope| scope.dimension(valued.value, None)),
+            None => Dim::Unknown,
+        };
+        if let (Dim::Known(declared), Dim::Known(given)) = (declared, dimension)
+            && declared != given
+        {
+            let parameter = &self.graph.parameters[id.index()];
+            d.push(
+                Diagnostic::error(
+                    "E0303",
                     Span::NONE,
-                    format!("no parameter is called `{name}`, so it cannot be set"),
-                );
-                let names = self.graph.parameters.iter().map(|p| p.name.as_str());
-                d.push(match (self.values.contains_key(name.as_str()), nearest(name, names)) {
-                    (true, _) => {
-                        error.help("signals and inputs are not set; `--drive` drives an input")
-                    }
-                    _ if self.vertices.contains_key(name.as_str()) => {
-                        self.value_of_element(name, error)
-                    }
-                    (_, Some(meant)) => did_you_mean(error, Span::NONE, meant),
-                    _ => error,
-                });
-                continue;
-            };
-            let before = d.len();
-            let value = parse_value(text, Span::NONE.file, d);
-            let expr = value
-                .as_ref()
-                .and_then(|value| self.lower(value, Place::constant("a parameter"), d));
-            if let (Some(value), Some(expr)) = (&value, expr) {
-                overridden.push((id.index(), text.clone(), self.dimension(value, None)));
-                let parameter = &mut self.graph.parameters[id.index()];
-                parameter.expr = expr;
-                parameter.unit = unit_of(value);
-                lowered[id.index()] = true;
-            }
-            for error in &mut d[before..] {
-                error.notes.push(format!("in the value that was set: {name}={text}"));
-            }
+                    format!("`{text}` is not a value for `{}`", parameter.name),
+                )
+                .label(parameter.span, format!("its dimension is {declared}"))
+                .because(format!("the dimension of `{text}` is {given}")),
+            );
         }
-        overridden
     }
 
     /// How the value of an element that was taken for a parameter can be set.
     fn value_of_element(&self, name: &str, error: Diagnostic) -> Diagnostic {
-        let declaration = self.declarations[self.vertices[name].index()];
+        let Some(id) = self.element_named(name) else { return error };
+        let declaration = self.declarations[id.index()];
         let noun = a(declaration.element.noun);
         let value = match declaration.arguments {
             Some([argument]) if argument.label.is_none() => self.map.text(argument.span),
@@ -125,55 +96,59 @@ impl Scope<'_> {
     }
 
     /// Evaluates a parameter after those that it uses, without recursion: a chain may be as long as the file.
-    fn evaluate_parameter(
-        &mut self,
-        first: usize,
-        lowered: &[bool],
-        marks: &mut [Mark],
-        d: &mut Vec<Diagnostic>,
-    ) {
+    pub fn demand(&mut self, first: usize, d: &mut Vec<Diagnostic>) {
+        match self.marks[first] {
+            Mark::Done => return,
+            Mark::Open => {
+                let span = self.graph.parameters[first].span;
+                return d.push(self.circle(&[first], first, span));
+            }
+            _ => {}
+        }
+        if self.demands >= MOST_DEMANDS {
+            d.push(
+                Diagnostic::error(
+                    "E0110",
+                    self.graph.parameters[first].span,
+                    "indices and bounds are nested too deeply",
+                )
+                .because(format!("at most {MOST_DEMANDS} within one another")),
+            );
+            self.marks[first] = Mark::Done;
+            return;
+        }
+        self.demands += 1;
         let mut path = vec![first];
         while let Some(&k) = path.last() {
-            if marks[k] == Mark::Done {
+            if self.marks[k] == Mark::Done {
                 path.pop();
                 continue;
             }
-            marks[k] = Mark::Open;
+            if self.marks[k] == Mark::Untouched {
+                self.marks[k] = Mark::Open;
+                if !self.lower_parameter(k, d) {
+                    self.marks[k] = Mark::Done;
+                    path.pop();
+                    continue;
+                }
+            }
+            self.marks[k] = Mark::Open;
             let mut uses = vec![];
             self.graph.parameters[k].expr.leaves(&mut |leaf, span| {
                 if let Leaf::Parameter(id) = leaf {
                     uses.push((id.index(), span));
                 }
             });
-            let open = uses.iter().find(|(used, _)| marks[*used] == Mark::Untouched);
-            if let Some((used, _)) = open {
+            let fresh = |used: &usize| self.marks[*used] == Mark::Untouched;
+            if let Some((used, _)) = uses.iter().find(|(used, _)| fresh(used)) {
                 path.push(*used);
                 continue;
             }
-            if let Some((used, span)) = uses.iter().find(|(used, _)| marks[*used] == Mark::Open) {
-                let start = path.iter().position(|on| on == used).unwrap_or(0);
-                let names = path[start..]
-                    .iter()
-                    .chain([used])
-                    .map(|k| format!("`{}`", self.graph.parameters[*k].name))
-                    .collect::<Vec<_>>();
-                let mut error = Diagnostic::error(
-                    "E0212",
-                    self.graph.parameters[*used].span,
-                    format!("the value of {} depends on itself", names[0]),
-                )
-                .says("this parameter");
-                if names.len() > 2 {
-                    error = error.because(format!("the circle is {}", names.join(" → ")));
-                }
-                d.push(error.label(*span, format!("needs {} here", names[0])));
-                marks[k] = Mark::Done;
-                path.pop();
-                continue;
-            }
-            marks[k] = Mark::Done;
-            path.pop();
-            if lowered[k] {
+            if let Some((used, span)) =
+                uses.iter().find(|(used, _)| self.marks[*used] == Mark::Open)
+            {
+                d.push(self.circle(&path, *used, *span));
+            } else {
                 let parameter = &self.graph.parameters[k];
                 let what = format!("`{}`", parameter.name);
                 let span = if parameter.expr.span.is_none() {
@@ -181,12 +156,58 @@ impl Scope<'_> {
                 } else {
                     parameter.expr.span
                 };
-                if let Some(value) = self.evaluate(&parameter.expr, &what, span, d) {
+                let expr = parameter.expr.clone();
+                if let Some(value) = self.evaluate(&expr, &what, span, d) {
                     self.graph.parameters[k].value = value;
                     self.evaluated[k] = true;
                 }
             }
+            self.marks[k] = Mark::Done;
+            path.pop();
         }
+        self.demands -= 1;
+    }
+
+    /// Lowers the value of a parameter where its names are looked up; says whether it has one.
+    fn lower_parameter(&mut self, k: usize, d: &mut Vec<Diagnostic>) -> bool {
+        let Some(valued) = self.parameters[k] else { return false };
+        let before = d.len();
+        let place = Place::constant("a parameter");
+        let Some(expr) = self.at(valued.here, |scope| scope.lower(valued.value, place, d)) else {
+            if let Some(setting) = self.set.iter().find(|s| s.taken.is_some_and(|p| p.index() == k))
+            {
+                for error in &mut d[before..] {
+                    error.notes.push(format!(
+                        "in the value that was set: {}={}",
+                        setting.name, setting.text
+                    ));
+                }
+            }
+            return false;
+        };
+        self.graph.parameters[k].unit = unit_of(valued.value);
+        self.graph.parameters[k].expr = expr;
+        true
+    }
+
+    /// The error for a parameter whose value depends on itself.
+    fn circle(&self, path: &[usize], used: usize, span: Span) -> Diagnostic {
+        let start = path.iter().position(|on| *on == used).unwrap_or(0);
+        let names: Vec<String> = path[start..]
+            .iter()
+            .chain([&used])
+            .map(|k| format!("`{}`", self.graph.parameters[*k].name))
+            .collect();
+        let mut error = Diagnostic::error(
+            "E0212",
+            self.graph.parameters[used].span,
+            format!("the value of {} depends on itself", names[0]),
+        )
+        .says("this parameter");
+        if names.len() > 2 {
+            error = error.because(format!("the circle is {}", names.join(" → ")));
+        }
+        error.label(span, format!("needs {} here", names[0]))
     }
 }
 

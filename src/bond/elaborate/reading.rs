@@ -1,9 +1,10 @@
 //! Readings: e(x), f(x), q(x), p(x), power(x), and e(a -> b), f(a -> b), power(a -> b).
 
+use super::frames::{Found, FrameId, PortId, Thing};
 use super::scope::{Scope, a};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
-use crate::bond::syntax::{Call, Path, Value};
+use crate::bond::syntax::{Call, Part, Path, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Expr as Tree, Node};
 use crate::source::Span;
@@ -13,7 +14,7 @@ pub(super) const READINGS: [&str; 5] = ["e", "f", "q", "p", "power"];
 
 impl Scope<'_> {
     /// What a reading means.
-    pub fn reading(&self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Expr> {
+    pub fn reading(&mut self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let argument = match call.rows.as_slice() {
             [row] if row.len() == 1 && row[0].label.is_none() => &row[0].value,
             _ => {
@@ -49,18 +50,29 @@ impl Scope<'_> {
     }
 
     fn element_reading(
-        &self,
+        &mut self,
         call: &Call,
         path: &Path,
         span: Span,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Expr> {
-        let id = self.vertex(path, d)?;
-        let port = self.port(id, path, d)?;
+        let what = call.name.text.as_str();
+        let found = self.resolve(path, d)?;
+        let id = match found.thing {
+            Thing::Vertex(id) => id,
+            Thing::Port(port) => return self.port_reading(what, port, found.rest, span, d),
+            Thing::Instance(frame) => {
+                d.push(self.instance_reading(what, frame, span));
+                return None;
+            }
+        };
+        let port = self.port(id, found.rest, d)?;
         let declaration = self.declarations[id.index()];
         let shape = declaration.element.shape;
-        let what = call.name.text.as_str();
-        let (name, noun) = (path.name.text.as_str(), declaration.element.noun);
+        let name = self.map.text(path.span);
+        let name =
+            if found.rest.is_empty() { name } else { name.rsplit_once('.').map_or(name, |n| n.0) };
+        let noun = declaration.element.noun;
         let wrong = |message: String| {
             Diagnostic::error("E0214", span, message)
                 .says("cannot be read")
@@ -129,22 +141,70 @@ impl Scope<'_> {
         Some(variable(what, bond, negated, span))
     }
 
+    /// A reading of a port: its bond's, along the half arrow that the model declares.
+    fn port_reading(
+        &self,
+        what: &str,
+        port: PortId,
+        rest: &[Part],
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr> {
+        let port = &self.ports[port.0 as usize];
+        if matches!(what, "q" | "p") || !rest.is_empty() {
+            d.push(
+                Diagnostic::error("E0214", span, format!("a port stores no `{what}`"))
+                    .says("cannot be read")
+                    .label(port.span, "the port")
+                    .help("of a port e, f and power can be read"),
+            );
+            return None;
+        }
+        Some(variable(what, port.bond?, false, span))
+    }
+
+    fn instance_reading(&self, what: &str, frame: FrameId, span: Span) -> Diagnostic {
+        let inner = &self.frames[frame.0 as usize];
+        let ports: Vec<String> = inner
+            .ports
+            .iter()
+            .map(|port| format!("`{what}({})`", self.ports[port.0 as usize].name))
+            .collect();
+        let error = Diagnostic::error(
+            "E0214",
+            span,
+            format!("`{}` is an instance of a model", inner.prefix.trim_end_matches('.')),
+        )
+        .says("cannot be read as a whole")
+        .label(inner.span, "declared here");
+        match ports.is_empty() {
+            true => error.help(format!("read an element in it: `{what}({}…)`", inner.prefix)),
+            false => {
+                error.help(format!("read a port of it, {}, or an element in it", ports.join(", ")))
+            }
+        }
+    }
+
     /// q of a compliance, p of an inertia. In rate form the charge is counted from the start, on top of what is given.
     fn stored(&self, id: VertexId, span: Span) -> Expr {
         Tree::new(Node::Leaf(Leaf::Stored(id)), span)
     }
 
     fn bond_reading(
-        &self,
+        &mut self,
         call: &Call,
         from: &Path,
         to: &Path,
         span: Span,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Expr> {
-        let (a, b) = (self.vertex(from, d), self.vertex(to, d));
+        let (a, b) = (self.resolve(from, d), self.resolve(to, d));
         let (a, b) = (a?, b?);
-        let (from_port, to_port) = (self.port(a, from, d)?, self.port(b, to, d)?);
+        let mut side = |found: Found<'_>| match found.thing {
+            Thing::Vertex(id) => self.port(id, found.rest, d),
+            _ => Some(None),
+        };
+        let (from_port, to_port) = (side(a)?, side(b)?);
         let what = call.name.text.as_str();
         if matches!(what, "q" | "p") {
             d.push(
@@ -154,25 +214,25 @@ impl Scope<'_> {
             );
             return None;
         }
-        let joins = |bond: &BondId, x, x_port: Option<u32>, y, y_port: Option<u32>| {
-            let bond = self.graph.bond(*bond);
-            bond.from.vertex == x
-                && bond.to.vertex == y
-                && x_port.is_none_or(|port| bond.from.port == port)
-                && y_port.is_none_or(|port| bond.to.port == port)
+        let joins = |x: Thing, x_port: Option<u32>, y: Thing, y_port: Option<u32>| -> Vec<BondId> {
+            let fits = |bond: &&BondId| {
+                let bond = self.graph.bond(**bond);
+                x_port.is_none_or(|port| bond.from.port == port)
+                    && y_port.is_none_or(|port| bond.to.port == port)
+            };
+            self.bonds_between(x, y).iter().filter(fits).copied().collect()
         };
-        let found: Vec<BondId> =
-            self.graph.bond_ids().filter(|bond| joins(bond, a, from_port, b, to_port)).collect();
-        let written = format!("{} -> {}", from.text(), to.text());
+        let found = joins(a.thing, from_port, b.thing, to_port);
+        let written = format!("{} -> {}", self.map.text(from.span), self.map.text(to.span));
         let missing = |message: String| Diagnostic::error("E0215", span, message);
         match (found.as_slice(), &call.index) {
             ([bond], None) => Some(variable(what, *bond, false, span)),
             ([], _) => {
                 let error = missing(format!("there is no bond `{written}`")).says("no such bond");
-                let reversed =
-                    self.graph.bond_ids().any(|bond| joins(&bond, b, to_port, a, from_port));
+                let reversed = !joins(b.thing, to_port, a.thing, from_port).is_empty();
                 d.push(if reversed {
-                    let turned = format!("{} -> {}", to.text(), from.text());
+                    let turned =
+                        format!("{} -> {}", self.map.text(to.span), self.map.text(from.span));
                     error
                         .help(format!(
                             "its half arrow points the other way: write `{what}({turned})`"

@@ -1,23 +1,21 @@
-//! The names of a file: elements and junctions in one space, parameters, signals and inputs in another.
+//! Everything known while a graph is made: frames of names, declarations, and what is still to be lowered.
 
-use crate::bond::elements::{ELEMENTS, Element, element};
+use super::frames::{Body, Frame, FrameId, Here, Round, Thing};
+use super::structure::{Half, ModelPort};
+use crate::bond::elements::Element;
 use crate::bond::graph::*;
 use crate::bond::syntax::{
-    Argument, Chain, ChainEnd, Expr as Syntax, File, Name, ObserveItem, Part, Path, StatementKind,
+    Argument, Chain, Expr as Syntax, Name, ObserveItem, Part, Regulator as RegulatorSyntax,
 };
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Expr as Tree, Table};
+use crate::expr::Table;
 use crate::quantity::nearest;
 use crate::source::{FileId, SourceMap, Span};
-use std::collections::{HashMap, HashSet};
+use std::cell::OnceCell;
+use std::collections::HashMap;
 use std::sync::Arc;
 
-/// What a name of the space of values means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Meaning {
-    Parameter(ParameterId),
-    Signal(SignalId),
-}
+pub(super) use super::frames::Meaning;
 
 /// An element's declaration.
 #[derive(Clone, Copy)]
@@ -27,267 +25,96 @@ pub(super) struct Declaration<'a> {
     pub name: &'a Part,
     /// What stands in the file for it: kind, name and arguments.
     pub span: Span,
-    /// Index of its statement.
+    /// Number of its statement, in the order in which statements were carried out.
     pub statement: usize,
+    /// Where its arguments' names are looked up.
+    pub here: Here,
 }
 
-/// A parameter's or signal's statement.
+/// A parameter's or signal's value as written.
+#[derive(Clone, Copy)]
 pub(super) struct Valued<'a> {
     pub value: &'a Syntax,
     pub statement: usize,
+    /// Where its names are looked up.
+    pub here: Here,
 }
 
 /// Everything known while a file is elaborated.
 pub(super) struct Scope<'a> {
     pub map: &'a SourceMap,
     pub graph: BondGraph,
-    pub vertices: HashMap<&'a str, VertexId>,
-    pub values: HashMap<&'a str, Meaning>,
+    /// In which frame names are looked up now.
+    pub here: Here,
+    pub frames: Vec<Frame<'a>>,
+    pub rounds: Vec<Round>,
+    pub bodies: Vec<Body<'a>>,
+    /// By file, the models that can be used in it.
+    pub kinds: Vec<HashMap<String, usize>>,
+    /// By vertex.
     pub declarations: Vec<Declaration<'a>>,
-    pub chains: Vec<&'a Chain>,
-    pub parameters: Vec<Valued<'a>>,
-    /// By signal; `None` for inputs.
+    pub chains: Vec<(&'a Chain, Here)>,
+    /// Arrows as drawn, each with the bond that it became a part of.
+    pub halves: Vec<Half>,
+    pub ports: Vec<ModelPort>,
+    /// The bonds by what their arrows are drawn between; found when they are first asked for.
+    pub between: OnceCell<HashMap<(Thing, Thing), Vec<BondId>>>,
+    /// By parameter; `None` when it has no value.
+    pub parameters: Vec<Option<Valued<'a>>>,
+    /// By signal; `None` for inputs that nothing sets.
     pub signals: Vec<Option<Valued<'a>>>,
     /// Statement and rank within it, by signal: hidden ones come before the signal that they belong to.
     pub signal_order: Vec<(usize, usize)>,
-    pub outputs: Vec<&'a Part>,
+    pub outputs: Vec<(&'a Part, Here)>,
     pub drives: Vec<(&'a Part, Valued<'a>)>,
+    pub regulators: Vec<(&'a RegulatorSyntax, Here)>,
     pub simulate: Vec<(&'a Option<Syntax>, &'a Option<Syntax>, Span)>,
     pub options: Vec<&'a (Name, Name)>,
     pub observe: Vec<&'a ObserveItem>,
-    /// Words of statements that could not be read, and names of elements of unknown kind: what is missing because of
-    /// them needs no second error.
-    pub excused: HashSet<&'a str>,
     /// Names that hidden signals cannot take, with the last number tried behind each; filled by the first of them.
     pub hidden: HashMap<String, u32>,
     /// Tables that were read from files.
     pub tables: HashMap<FileId, Option<Arc<Table>>>,
+    /// What the command line sets: name, text, value, and whether a parameter has taken it.
+    pub set: Vec<Setting<'a>>,
+    /// How far the evaluation of each parameter has come.
+    pub marks: Vec<Mark>,
     /// Whether a parameter's value is known, by parameter.
     pub evaluated: Vec<bool>,
+    /// Demands for parameters within one another.
+    pub demands: usize,
+    /// Statements carried out so far.
+    pub clock: usize,
     /// The dimension of each parameter's value.
     pub parameter_dimensions: Vec<super::dimensions::Dim>,
     /// The dimension of each signal, as far as known.
     pub signal_dimensions: Vec<super::dimensions::Dim>,
 }
 
+/// How far the evaluation of a parameter has come.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Mark {
+    Untouched,
+    /// On the way from the parameter that began to the one looked at.
+    Open,
+    Done,
+}
+
+/// A parameter that the command line sets.
+pub(super) struct Setting<'a> {
+    pub name: &'a str,
+    pub text: &'a str,
+    pub value: Option<&'a Syntax>,
+    /// The parameter that it was for.
+    pub taken: Option<ParameterId>,
+    /// What the parameter would have been.
+    pub declared: Option<Valued<'a>>,
+}
+
 impl<'a> Scope<'a> {
-    /// Collects every declaration of a file.
-    pub fn collect(file: &'a File, map: &'a SourceMap, d: &mut Vec<Diagnostic>) -> Scope<'a> {
-        let mut scope = Scope {
-            map,
-            graph: BondGraph { name: stem(map, file), ..BondGraph::default() },
-            vertices: HashMap::new(),
-            values: HashMap::new(),
-            declarations: vec![],
-            chains: vec![],
-            parameters: vec![],
-            signals: vec![],
-            signal_order: vec![],
-            outputs: vec![],
-            drives: vec![],
-            simulate: vec![],
-            options: vec![],
-            observe: vec![],
-            excused: HashSet::new(),
-            hidden: HashMap::new(),
-            tables: HashMap::new(),
-            evaluated: vec![],
-            parameter_dimensions: vec![],
-            signal_dimensions: vec![],
-        };
-        for (statement, item) in file.statements.iter().enumerate() {
-            match &item.kind {
-                StatementKind::Chain(chain) => {
-                    scope.chains.push(chain);
-                    let ends = chain.first.iter().chain(chain.links.iter().flat_map(|(_, l)| l));
-                    ends.for_each(|end| scope.declare(end, statement, d));
-                }
-                StatementKind::Parameter { name, value, description } => {
-                    scope.declare_parameter(name, value, description.as_ref(), statement, d);
-                }
-                StatementKind::Signal { name, value } => {
-                    let valued = Some(Valued { value, statement });
-                    scope.declare_signal(name, SignalOrigin::Signal, valued, statement, d);
-                }
-                StatementKind::Input(names) => {
-                    for name in names {
-                        scope.declare_signal(name, SignalOrigin::Input, None, statement, d);
-                    }
-                }
-                StatementKind::Output(names) => scope.outputs.extend(names),
-                StatementKind::Drive { name, value } => {
-                    scope.drives.push((name, Valued { value, statement }));
-                }
-                StatementKind::Simulate { until, step } => {
-                    scope.simulate.push((until, step, item.span));
-                }
-                StatementKind::Options(options) => scope.options.extend(options),
-                StatementKind::Observe(items) => scope.observe.extend(items),
-                // Of hierarchy; the parser does not make them yet.
-                StatementKind::Import(_)
-                | StatementKind::Model(_)
-                | StatementKind::Port(_)
-                | StatementKind::For { .. }
-                | StatementKind::If { .. }
-                | StatementKind::Loop(_) => {}
-                StatementKind::Unreadable => {
-                    let text = map.text(item.span);
-                    let parts = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
-                    scope.excused.extend(parts.filter(|part| !part.is_empty()));
-                }
-            }
-        }
-        scope
-    }
-
-    fn declare(&mut self, end: &'a ChainEnd, statement: usize, d: &mut Vec<Diagnostic>) {
-        let Some(kind) = &end.kind else {
-            if let Some(arguments) = &end.arguments {
-                let name = end.path.text();
-                let at = arguments.first().map_or(end.span, |argument| argument.span);
-                d.push(
-                    Diagnostic::error("E0209", at, format!("`{name}` has arguments but no kind"))
-                        .label(end.path.span, "no kind before this name")
-                        .help(format!(
-                            "arguments belong where the element is declared, as in `R:{name}(…)`"
-                        )),
-                );
-            }
-            return;
-        };
-        let name = &end.path.name;
-        let Some(row) = element(&kind.text) else {
-            self.excused.insert(&name.text);
-            d.push(unknown_kind(kind, name));
-            return;
-        };
-        if let Some(member) = end.path.members.first() {
-            d.push(
-                Diagnostic::error(
-                    "E0204",
-                    member.span,
-                    "a port cannot be named where its element is declared",
-                )
-                .help(format!(
-                    "declare `{}:{}` in a statement of its own, then write `{}`",
-                    kind.text,
-                    name.text,
-                    end.path.text()
-                )),
-            );
-        }
-        if let Some(&first) = self.vertices.get(name.text.as_str()) {
-            let first = self.declarations[first.index()];
-            let mut error =
-                Diagnostic::error("E0203", end.span, format!("`{}` is declared twice", name.text))
-                    .says("declared again here")
-                    .label(first.span, "first declared here");
-            if first.element.kind == row.kind && end.arguments.is_none() {
-                error = error
-                    .help("write the name alone to speak of the same element")
-                    .fix("leave out the kind", vec![(end.span, end.path.text())]);
-            } else {
-                error = error.help("exactly one occurrence of a name carries its kind");
-            }
-            d.push(error);
-            return;
-        }
-        let id = VertexId(self.graph.vertices.len() as u32);
-        self.vertices.insert(&name.text, id);
-        self.graph.vertices.push(Vertex {
-            name: name.text.clone(),
-            kind: row.kind,
-            law: Law::One,
-            span: kind.span.join(name.span),
-            bonds: vec![],
-        });
-        self.declarations.push(Declaration {
-            element: row,
-            arguments: end.arguments.as_deref(),
-            name,
-            span: end.span,
-            statement,
-        });
-    }
-
-    fn declare_parameter(
-        &mut self,
-        name: &'a Part,
-        value: &'a Syntax,
-        description: Option<&Name>,
-        statement: usize,
-        d: &mut Vec<Diagnostic>,
-    ) {
-        let id = ParameterId(self.graph.parameters.len() as u32);
-        if !self.declare_value(name, Meaning::Parameter(id), d) {
-            return;
-        }
-        self.graph.parameters.push(Parameter {
-            name: name.text.clone(),
-            expr: Tree::number(f64::NAN),
-            value: f64::NAN,
-            unit: None,
-            description: description.map(|text| text.text.clone()).unwrap_or_default(),
-            span: name.span,
-        });
-        self.parameters.push(Valued { value, statement });
-    }
-
-    fn declare_signal(
-        &mut self,
-        name: &'a Part,
-        origin: SignalOrigin,
-        valued: Option<Valued<'a>>,
-        statement: usize,
-        d: &mut Vec<Diagnostic>,
-    ) {
-        let id = SignalId(self.graph.signals.len() as u32);
-        if !self.declare_value(name, Meaning::Signal(id), d) {
-            return;
-        }
-        self.graph.signals.push(Signal {
-            name: name.text.clone(),
-            law: SignalLaw::Algebraic(Tree::number(0.0)),
-            origin,
-            span: name.span,
-            unit: None,
-        });
-        self.signals.push(valued);
-        self.signal_order.push((statement, usize::MAX));
-    }
-
-    /// Takes a name into the space of values, unless it is taken or reserved.
-    fn declare_value(&mut self, name: &'a Part, meaning: Meaning, d: &mut Vec<Diagnostic>) -> bool {
-        if RESERVED.contains(&name.text.as_str()) {
-            self.excused.insert(&name.text);
-            let means = match name.text.as_str() {
-                "time" => "the time",
-                "pi" => "the number π",
-                _ => "an element's own variable",
-            };
-            d.push(
-                Diagnostic::error(
-                    "E0205",
-                    name.span,
-                    format!("`{}` cannot name a parameter or a signal", name.text),
-                )
-                .says(format!("in a law this is {means}"))
-                .help("choose another name"),
-            );
-            return false;
-        }
-        if let Some(first) = self.values.get(name.text.as_str()) {
-            let first = self.value_span(*first);
-            d.push(
-                Diagnostic::error("E0203", name.span, format!("`{}` is declared twice", name.text))
-                    .says("declared again here")
-                    .label(first, "first declared here")
-                    .because("parameters, signals and inputs share one space of names"),
-            );
-            return false;
-        }
-        self.values.insert(&name.text, meaning);
-        true
+    /// The name of an element as messages give it, with those of the instances around it.
+    pub fn shown(&self, id: VertexId) -> &str {
+        &self.graph.vertices[id.index()].name
     }
 
     /// Where a parameter or signal is declared.
@@ -298,33 +125,57 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The element of a name; an error tells the nearest.
-    pub fn vertex(&self, path: &Path, d: &mut Vec<Diagnostic>) -> Option<VertexId> {
-        let name = path.name.text.as_str();
-        if let Some(id) = self.vertices.get(name) {
-            return Some(*id);
-        }
-        if self.excused.contains(name) {
-            return None;
-        }
+    /// The error for an element that is not declared in a frame; it tells the nearest.
+    pub fn unknown_thing(&self, frame: FrameId, part: &Part, key: &str) -> Diagnostic {
+        let names = &self.frames[frame.0 as usize];
+        let body = &self.bodies[names.body];
+        let inside = if frame == self.here.frame {
+            String::new()
+        } else {
+            format!(" in `{}`", names.prefix.trim_end_matches('.'))
+        };
         let error = Diagnostic::error(
             "E0206",
-            path.name.span,
-            format!("no element or junction is called `{name}`"),
+            part.span,
+            format!("no element or junction is called `{key}`{inside}"),
         )
         .says("not declared anywhere");
-        let declared = self.graph.vertices.iter().map(|vertex| vertex.name.as_str());
+        let error = match inside.is_empty() {
+            true => error,
+            false => error.label(body.span, format!("the model `{}`", body.name)),
+        };
         // Names in statements that could not be read may be meant too; sorted, so that a tie has one winner.
-        let unread: std::collections::BTreeSet<&str> = self.excused.iter().copied().collect();
-        let names = declared.chain(unread);
-        d.push(if let Some(meant) = nearest(name, names) {
-            did_you_mean(error, path.name.span, meant)
-        } else if self.values.contains_key(name) {
-            error.because(format!("`{name}` is a parameter or signal, which no bond can join"))
+        let known: std::collections::BTreeSet<&str> = names
+            .things
+            .keys()
+            .map(|name| name.as_ref())
+            .chain(names.excused.iter().copied())
+            .collect();
+        let array: Vec<&str> = known
+            .iter()
+            .filter(|name| {
+                name.strip_prefix(part.text.as_str()).is_some_and(|rest| rest.starts_with('['))
+            })
+            .copied()
+            .collect();
+        if let (Some(first), Some(last)) = (array.first(), array.last()) {
+            return match part.indices.is_empty() {
+                true => error.help(format!("`{}` has an index, as in `{first}`", part.text)),
+                false => error.because(format!(
+                    "there are {} of them, `{first}` and `{last}` among them",
+                    array.len()
+                )),
+            };
+        }
+        if let Some(meant) = nearest(key, known.iter().copied()) {
+            did_you_mean(error, part.span, meant)
+        } else if names.values.contains_key(key) {
+            error.because(format!("`{key}` is a parameter or signal, which no bond can join"))
+        } else if inside.is_empty() {
+            error.help(format!("give it a kind where it is declared, as in `1:{}`", part.text))
         } else {
-            error.help(format!("give it a kind where it is declared, as in `1:{name}`"))
-        });
-        None
+            error
+        }
     }
 }
 
@@ -343,34 +194,4 @@ pub(super) fn did_you_mean(error: Diagnostic, span: Span, meant: &str) -> Diagno
         return error;
     }
     error.fix(format!("write `{meant}`"), vec![(span, meant.to_string())])
-}
-
-fn unknown_kind(kind: &Name, name: &Part) -> Diagnostic {
-    let text = kind.text.as_str();
-    if text == "IC" || text == "MIC" {
-        return Diagnostic::error("E0201", kind.span, "fields are not part of the language yet")
-            .says("a field");
-    }
-    let error = Diagnostic::error("E0204", kind.span, format!("`{text}` is no kind of element"))
-        .says("unknown kind");
-    match nearest(text, ELEMENTS.iter().map(|row| row.kind)) {
-        Some(meant) => did_you_mean(error, kind.span, meant),
-        None => error
-            .because(format!(
-                "the kinds are {}",
-                ELEMENTS.iter().map(|row| row.kind).collect::<Vec<_>>().join(" ")
-            ))
-            .help(format!(
-                "instances of models are not part of the language yet; `{}` must be one of these",
-                name.text
-            )),
-    }
-}
-
-/// The name of a file without folders and ending.
-fn stem(map: &SourceMap, file: &File) -> String {
-    let name = map.file(file.file).map_or("", |file| file.name.as_str());
-    let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    let stem = last.strip_suffix(".bg").unwrap_or(last);
-    stem.trim_matches(['<', '>']).to_string()
 }

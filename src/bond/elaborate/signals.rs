@@ -1,7 +1,7 @@
 //! Signals: their laws, the hidden ones that functions with memory bring along, and loops.
 
 use super::functions::{self, Signature};
-use super::scope::{Meaning, Scope, did_you_mean};
+use super::scope::{Meaning, Scope, Valued, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Part, parse_drive};
@@ -14,12 +14,9 @@ impl Scope<'_> {
     /// Gives every signal and input its law, and puts hidden ones before those that they belong to.
     pub fn make_signals(&mut self, drives: &[String], d: &mut Vec<Diagnostic>) {
         for k in 0..self.signals.len() {
-            let Some((value, statement)) = self.signals[k].as_ref().map(|s| (s.value, s.statement))
-            else {
-                continue;
-            };
+            let Some(Valued { value, statement, here }) = self.signals[k] else { continue };
             let id = SignalId(k as u32);
-            if let Some(law) = self.signal_law(id, value, statement, d) {
+            if let Some(law) = self.at(here, |scope| scope.signal_law(id, value, statement, d)) {
                 self.graph.signals[k].law = law;
             }
         }
@@ -52,9 +49,9 @@ impl Scope<'_> {
     pub fn hide(&mut self, owner: &str, part: &str, span: Span, statement: usize) -> SignalId {
         let id = SignalId(self.graph.signals.len() as u32);
         if self.hidden.is_empty() {
-            let all = self.graph.signals.iter().map(|signal| signal.name.as_str());
-            let all = all.chain(self.values.keys().copied());
-            self.hidden = all.map(|name| (name.to_string(), 1)).collect();
+            let signals = self.graph.signals.iter().map(|signal| signal.name.as_str());
+            let parameters = self.graph.parameters.iter().map(|parameter| parameter.name.as_str());
+            self.hidden = signals.chain(parameters).map(|name| (name.to_string(), 1)).collect();
         }
         let base = format!("{owner}_{part}");
         let mut count = self.hidden.get(&base).copied().unwrap_or(0);
@@ -80,7 +77,12 @@ impl Scope<'_> {
         let drives = std::mem::take(&mut self.drives);
         let mut driven: Vec<Option<Span>> = vec![None; self.graph.signals.len()];
         for (name, valued) in &drives {
-            let Some(id) = self.input(name, d) else { continue };
+            let here = valued.here;
+            let Some(id) = self.at(here, |scope| scope.input(name, d)) else { continue };
+            if self.signals.get(id.index()).is_some_and(Option::is_some) {
+                // The instance says what this input gets.
+                continue;
+            }
             if let Some(first) = driven[id.index()].replace(name.span) {
                 d.push(
                     Diagnostic::error(
@@ -93,7 +95,9 @@ impl Scope<'_> {
                 );
                 continue;
             }
-            if let Some(law) = self.signal_law(id, valued.value, valued.statement, d) {
+            let law =
+                self.at(here, |scope| scope.signal_law(id, valued.value, valued.statement, d));
+            if let Some(law) = law {
                 self.graph.signals[id.index()].law = law;
             }
         }
@@ -114,7 +118,8 @@ impl Scope<'_> {
             }
         }
         for (k, signal) in self.graph.signals.iter().enumerate() {
-            let open = driven.get(k).is_some_and(Option::is_none);
+            let given = self.signals.get(k).is_some_and(Option::is_some);
+            let open = !given && driven.get(k).is_some_and(Option::is_none);
             if signal.origin == SignalOrigin::Input && open {
                 self.graph.experiment.undriven.push(SignalId(k as u32));
             }
@@ -134,16 +139,17 @@ impl Scope<'_> {
     }
 
     /// The input of a name.
-    fn input(&self, name: &Part, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
-        let text = name.text.as_str();
+    fn input(&mut self, name: &Part, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
+        let key = self.full_key(name, d)?;
+        let text = &*key;
         let inputs = || self.graph.signals.iter().filter(|s| s.origin == SignalOrigin::Input);
-        match self.values.get(text) {
+        match self.value(text) {
             Some(Meaning::Signal(id))
                 if self.graph.signals[id.index()].origin == SignalOrigin::Input =>
             {
-                return Some(*id);
+                return Some(id);
             }
-            _ if self.excused.contains(text) => {}
+            _ if self.excused(&name.text) => {}
             Some(meaning) => {
                 let what = match meaning {
                     Meaning::Parameter(_) => "a parameter",
@@ -152,7 +158,7 @@ impl Scope<'_> {
                 d.push(
                     Diagnostic::error("E0219", name.span, format!("`{text}` is no input"))
                         .says("only inputs are driven")
-                        .label(self.value_span(*meaning), format!("`{text}` is {what}")),
+                        .label(self.value_span(meaning), format!("`{text}` is {what}")),
                 );
             }
             None => {
@@ -168,32 +174,36 @@ impl Scope<'_> {
         None
     }
 
-    fn check_outputs(&self, d: &mut Vec<Diagnostic>) {
-        for name in &self.outputs {
-            let text = name.text.as_str();
-            if self.excused.contains(text) {
-                continue;
-            }
-            match self.values.get(text) {
-                Some(Meaning::Signal(_)) => {}
-                Some(meaning) => d.push(
-                    Diagnostic::error("E0224", name.span, format!("`{text}` is no signal"))
-                        .says("outputs are signals")
-                        .label(self.value_span(*meaning), "a parameter"),
-                ),
-                None => {
-                    let error = Diagnostic::error(
-                        "E0224",
-                        name.span,
-                        format!("no signal is called `{text}`"),
-                    )
-                    .says("not declared anywhere");
-                    let names = self.graph.signals.iter().map(|s| s.name.as_str());
-                    d.push(match nearest(text, names) {
-                        Some(meant) => did_you_mean(error, name.span, meant),
-                        None => error.help(format!("declare it: `signal {text} = …`")),
-                    });
-                }
+    fn check_outputs(&mut self, d: &mut Vec<Diagnostic>) {
+        let outputs = std::mem::take(&mut self.outputs);
+        for (name, here) in &outputs {
+            self.at(*here, |scope| scope.check_output(name, d));
+        }
+        self.outputs = outputs;
+    }
+
+    fn check_output(&mut self, name: &Part, d: &mut Vec<Diagnostic>) {
+        let Some(key) = self.full_key(name, d) else { return };
+        let text = &*key;
+        if self.excused(&name.text) {
+            return;
+        }
+        match self.value(text) {
+            Some(Meaning::Signal(_)) => {}
+            Some(meaning) => d.push(
+                Diagnostic::error("E0224", name.span, format!("`{text}` is no signal"))
+                    .says("outputs are signals")
+                    .label(self.value_span(meaning), "a parameter"),
+            ),
+            None => {
+                let error =
+                    Diagnostic::error("E0224", name.span, format!("no signal is called `{text}`"))
+                        .says("not declared anywhere");
+                let names = self.graph.signals.iter().map(|s| s.name.as_str());
+                d.push(match nearest(text, names) {
+                    Some(meant) => did_you_mean(error, name.span, meant),
+                    None => error.help(format!("declare it: `signal {text} = …`")),
+                });
             }
         }
     }
@@ -275,9 +285,11 @@ impl Scope<'_> {
         let dimensions = order.iter().map(|old| self.signal_dimensions[*old]).collect();
         self.signal_dimensions = dimensions;
         self.signal_order.sort_unstable();
-        for meaning in self.values.values_mut() {
-            if let Meaning::Signal(id) = meaning {
-                *id = place[id.index()];
+        for frame in &mut self.frames {
+            for meaning in frame.values.values_mut() {
+                if let Meaning::Signal(id) = meaning {
+                    *id = place[id.index()];
+                }
             }
         }
         for id in &mut graph.experiment.undriven {

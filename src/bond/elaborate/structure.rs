@@ -1,11 +1,14 @@
 //! Bonds: which ports they join, and whether every port has what it needs.
 
-use super::scope::{Scope, a};
+use super::expand::list;
+use super::frames::{Found, FrameId, Here, PortId, Thing};
+use super::scope::{Scope, a, did_you_mean};
 use crate::bond::graph::*;
-use crate::bond::syntax::{Arrow, ChainEnd, Path};
+use crate::bond::syntax::{self, Arrow, Chain, ChainEnd, Part};
 use crate::diagnostic::Diagnostic;
-use crate::quantity::Domain;
+use crate::quantity::{DOMAINS, Domain, nearest};
 use crate::source::Span;
+use std::collections::{HashMap, HashSet};
 
 /// One end of an arrow, before ports are given out.
 #[derive(Clone, Copy)]
@@ -15,77 +18,479 @@ struct Joint {
     named: Option<u32>,
     /// Where the name stands.
     span: Span,
-    /// Where all of the end stands, kind and arguments included.
-    whole: Span,
+}
+
+/// An end of an arrow as drawn.
+#[derive(Clone, Copy)]
+enum Tip {
+    Vertex(Joint),
+    Port(PortId),
+}
+
+impl Tip {
+    fn thing(self) -> Thing {
+        match self {
+            Tip::Vertex(joint) => Thing::Vertex(joint.vertex),
+            Tip::Port(port) => Thing::Port(port),
+        }
+    }
+}
+
+/// An arrow as drawn: a bond, or a part of one on one side of a port.
+pub(super) struct Half {
+    from: Tip,
+    to: Tip,
+    stroke: Option<Stroke>,
+    span: Span,
+    /// The bond that it became a part of.
+    bond: Option<BondId>,
+}
+
+/// A port of an instance.
+pub(super) struct ModelPort {
+    /// Whether its half arrow points into the model.
+    pub into: bool,
+    pub name: String,
+    pub domain: Option<(Domain, Span)>,
+    pub span: Span,
+    /// Whose port it is.
+    pub frame: FrameId,
+    /// The arrows at its two sides.
+    inner: Option<usize>,
+    outer: Option<usize>,
+    /// Whether an arrow at it could not be read.
+    excused: bool,
+    /// Its bond.
+    pub bond: Option<BondId>,
 }
 
 /// What joins a vertex: the bond, whether at its head, and the joint.
 type Joined = (BondId, bool, Joint);
 
-impl Scope<'_> {
-    /// Makes a bond of every arrow, gives out ports, and checks their numbers.
-    pub fn join_bonds(&mut self, d: &mut Vec<Diagnostic>) {
-        let mut joined: Vec<Vec<Joined>> = vec![vec![]; self.graph.vertices.len()];
-        let mut incomplete: Vec<VertexId> = vec![];
-        let chains = std::mem::take(&mut self.chains);
-        for chain in &chains {
-            let first: Vec<_> =
-                chain.first.iter().map(|end| self.joint(end, &mut incomplete, d)).collect();
-            let mut from = first.last().copied().flatten();
-            for (arrow, ends) in &chain.links {
-                let mut last = None;
-                for end in ends {
-                    let to = self.joint(end, &mut incomplete, d);
-                    match (from, to) {
-                        (Some(from), Some(to)) => self.join(from, to, arrow, &mut joined, d),
-                        // The other end has been reported: do not count this one's bonds.
-                        (one, other) => incomplete.extend(one.or(other).map(|j| j.vertex)),
-                    }
-                    last = to;
+impl<'a> Scope<'a> {
+    /// Takes in a port of the frame.
+    pub fn declare_port(&mut self, port: &'a syntax::Port, span: Span, d: &mut Vec<Diagnostic>) {
+        let Some(key) = self.full_key(&port.name, d) else { return };
+        if let Some(first) = self.frame().things.get(&key).copied() {
+            let first = match first {
+                Thing::Vertex(id) => self.declarations[id.index()].span,
+                Thing::Instance(frame) => self.frames[frame.0 as usize].span,
+                Thing::Port(port) => self.ports[port.0 as usize].span,
+            };
+            d.push(
+                Diagnostic::error("E0203", span, format!("`{key}` is declared twice"))
+                    .says("declared again here")
+                    .label(first, "first declared here"),
+            );
+            return;
+        }
+        let mut domain = None;
+        if let Some(name) = &port.domain {
+            match DOMAINS.iter().find(|row| row.name == name.text) {
+                Some(row) => domain = Some((row.domain, name.span)),
+                None => {
+                    let error = Diagnostic::error(
+                        "E0240",
+                        name.span,
+                        format!("`{}` is no domain", name.text),
+                    )
+                    .says("unknown domain");
+                    let names = DOMAINS.iter().map(|row| row.name);
+                    d.push(match nearest(&name.text, names.clone()) {
+                        Some(meant) => did_you_mean(error, name.span, meant),
+                        None => error.because(format!(
+                            "the domains are {}",
+                            list(&names.collect::<Vec<_>>())
+                        )),
+                    });
                 }
-                from = last;
             }
         }
+        let id = PortId(self.ports.len() as u32);
+        let name = format!("{}{key}", self.frame().prefix);
+        self.frame_mut().things.insert(key, Thing::Port(id));
+        self.frame_mut().ports.push(id);
+        self.ports.push(ModelPort {
+            into: port.into,
+            name,
+            domain,
+            span,
+            frame: self.here.frame,
+            inner: None,
+            outer: None,
+            excused: false,
+            bond: None,
+        });
+    }
+
+    /// Makes a bond of every arrow, gives out ports, and checks their numbers.
+    pub fn join_bonds(&mut self, d: &mut Vec<Diagnostic>) {
+        let mut incomplete: HashSet<VertexId> = HashSet::new();
+        let chains = std::mem::take(&mut self.chains);
+        for (chain, here) in &chains {
+            self.at(*here, |scope| scope.draw(chain, &mut incomplete, d));
+        }
         self.chains = chains;
+        let joined = self.make_bonds(d);
+        self.check_ports(d);
         // A statement that could not be read may hold the bonds that seem to be missing.
         for id in self.graph.vertex_ids().collect::<Vec<_>>() {
-            let excused = self.excused.contains(self.graph.vertex(id).name.as_str());
+            let declaration = self.declarations[id.index()];
+            let frame = &self.frames[declaration.here.frame.0 as usize];
+            let excused = frame.excused.contains(declaration.name.text.as_str());
             let whole = !incomplete.contains(&id) && !excused;
             self.give_ports(id, &joined[id.index()], whole, d);
         }
         self.check_sources(d);
     }
 
-    /// The end of an arrow; an error has been reported when there is none, and `incomplete` learns whose bond is missing.
-    fn joint(
-        &self,
-        end: &ChainEnd,
-        incomplete: &mut Vec<VertexId>,
-        d: &mut Vec<Diagnostic>,
-    ) -> Option<Joint> {
-        let vertex = self.vertex(&end.path, d)?;
-        let Some(named) = self.port(vertex, &end.path, d) else {
-            incomplete.push(vertex);
-            return None;
+    /// The arrows of a chain.
+    fn draw(&mut self, chain: &Chain, incomplete: &mut HashSet<VertexId>, d: &mut Vec<Diagnostic>) {
+        let mut miss = |scope: &mut Scope<'a>, tip: Option<Tip>| match tip {
+            // The other end has been reported: do not count this one's bonds.
+            Some(Tip::Vertex(joint)) => {
+                incomplete.insert(joint.vertex);
+            }
+            Some(Tip::Port(port)) => scope.ports[port.0 as usize].excused = true,
+            None => {}
         };
-        Some(Joint { vertex, named, span: end.path.span, whole: end.span })
+        let mut last: Option<&ChainEnd> = chain.first.last();
+        // What an end means is found out once, though it stands behind one arrow and before the next.
+        let mut found = last.and_then(|end| self.tip_of(end, d));
+        for (arrow, ends) in &chain.links {
+            let from = match (last, &found) {
+                (Some(end), Some(found)) => self.tip(end, found, false, d),
+                _ => None,
+            };
+            let before = last;
+            for end in ends {
+                last = Some(end);
+                found = self.tip_of(end, d);
+                let to = found.as_ref().and_then(|found| self.tip(end, found, true, d));
+                match (from, to) {
+                    (Some(one), Some(other)) => {
+                        self.add_half((before.unwrap_or(end), one), (end, other), arrow, d);
+                    }
+                    (one, other) => miss(self, one.or(other)),
+                }
+            }
+        }
     }
 
-    /// The port that a path names: `Some(None)` when it names none, `None` when it names a wrong one.
+    /// What an end of an arrow means.
+    fn tip_of<'p>(&mut self, end: &'p ChainEnd, d: &mut Vec<Diagnostic>) -> Option<Found<'p>> {
+        let found = self.resolve(&end.path, d)?;
+        if found.within
+            && let Thing::Vertex(id) = found.thing
+        {
+            let span = end.path.span;
+            let declared = self.declarations[id.index()].span;
+            d.push(
+                Diagnostic::error(
+                    "E0413",
+                    span,
+                    format!("`{}` is inside its model, where no bond from outside leads", self.shown(id)),
+                )
+                .says("not a port")
+                .label(declared, "declared here")
+                .help("join a port of the instance; the model declares it with `port in …` or `port out …`"),
+            );
+            return None;
+        }
+        Some(found)
+    }
+
+    /// The end of an arrow; `head`: the arrow points to it.
+    fn tip(
+        &mut self,
+        end: &ChainEnd,
+        found: &Found<'_>,
+        head: bool,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Tip> {
+        let span = end.path.span;
+        let port = match found.thing {
+            Thing::Vertex(vertex) => {
+                let named = self.port(vertex, found.rest, d)?;
+                return Some(Tip::Vertex(Joint { vertex, named, span }));
+            }
+            Thing::Port(port) => port,
+            Thing::Instance(frame) => self.only_port(frame, end, head, d)?,
+        };
+        if let Some(member) = found.rest.first() {
+            d.push(
+                Diagnostic::error("E0410", member.span, "a port has no parts").says("no such part"),
+            );
+            return None;
+        }
+        // From inside, the roles of the two ends are exchanged.
+        let inside = self.ports[port.0 as usize].frame == self.here.frame;
+        let into = self.ports[port.0 as usize].into;
+        if (head != inside) != into {
+            let port = &self.ports[port.0 as usize];
+            let (way, draw) = match (inside, into) {
+                (false, true) => ("points into the model", "`… -> {}`"),
+                (false, false) => ("points out of the model", "`{} -> …`"),
+                (true, true) => ("points into the model", "`{} -> …`"),
+                (true, false) => ("points out of the model", "`… -> {}`"),
+            };
+            let draw = draw.replace("{}", self.map.text(span));
+            d.push(
+                Diagnostic::error(
+                    "E0414",
+                    span,
+                    format!("the half arrow of the port `{}` {way}", port.name),
+                )
+                .says("here it points the other way")
+                .label(port.span, "the port")
+                .help(format!("draw it {draw}")),
+            );
+            return None;
+        }
+        Some(Tip::Port(port))
+    }
+
+    /// The port that an instance's name alone means at an end of an arrow.
+    fn only_port(
+        &self,
+        frame: FrameId,
+        end: &ChainEnd,
+        head: bool,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<PortId> {
+        let inner = &self.frames[frame.0 as usize];
+        let name = inner.prefix.trim_end_matches('.');
+        let fits: Vec<PortId> =
+            inner.ports.iter().filter(|p| self.ports[p.0 as usize].into == head).copied().collect();
+        if let [only] = fits.as_slice() {
+            return Some(*only);
+        }
+        let body = &self.bodies[inner.body];
+        if inner.excused.contains("port") {
+            return None;
+        }
+        let way = if head { "in" } else { "out" };
+        let listed: Vec<String> = inner
+            .ports
+            .iter()
+            .map(|port| {
+                let port = &self.ports[port.0 as usize];
+                let way = if port.into { "in" } else { "out" };
+                format!("`{}` ({way})", port.name)
+            })
+            .collect();
+        let error = Diagnostic::error(
+            "E0412",
+            end.path.span,
+            match fits.len() {
+                0 => format!("`{name}` has no `{way}` port for this arrow"),
+                n => format!("`{name}` has {n} `{way}` ports, which one?"),
+            },
+        )
+        .says(format!("an instance of `{}`", body.name))
+        .label(body.span, "the model");
+        d.push(match listed.is_empty() {
+            true => error.help(
+                "a model that bonds join has ports, declared by `port in …` and `port out …`",
+            ),
+            false => error.help(format!("name the port: {}", listed.join(", "))),
+        });
+        None
+    }
+
+    fn add_half(
+        &mut self,
+        from: (&ChainEnd, Tip),
+        to: (&ChainEnd, Tip),
+        arrow: &Arrow,
+        d: &mut Vec<Diagnostic>,
+    ) {
+        // Of several ends in a list each has its own place: only the first stands right behind the arrow.
+        let whole = to.0.span;
+        let behind = self.map.text(Span { start: arrow.span.end, end: whole.start, ..whole });
+        let span = if behind.contains(',') { whole } else { from.0.span.join(whole) };
+        let index = self.halves.len();
+        for (end, tip) in [from, to] {
+            let Tip::Port(id) = tip else { continue };
+            let inside = self.ports[id.0 as usize].frame == self.here.frame;
+            let port = &mut self.ports[id.0 as usize];
+            let slot = if inside { &mut port.inner } else { &mut port.outer };
+            if let Some(first) = *slot {
+                let side = if inside { "inside" } else { "outside" };
+                let error = Diagnostic::error(
+                    "E0415",
+                    end.path.span,
+                    format!("two bonds join the port `{}` from {side}", port.name),
+                )
+                .says("joined again here")
+                .label(self.halves[first].span, "first joined here")
+                .label(port.span, "the port");
+                d.push(error.help("put a junction at the port, and join both to it"));
+                return;
+            }
+            *slot = Some(index);
+        }
+        self.halves.push(Half { from: from.1, to: to.1, stroke: arrow.stroke, span, bond: None });
+    }
+
+    /// The bonds: each from a vertex through any number of ports to a vertex.
+    fn make_bonds(&mut self, d: &mut Vec<Diagnostic>) -> Vec<Vec<Joined>> {
+        let mut joined: Vec<Vec<Joined>> = vec![vec![]; self.graph.vertices.len()];
+        for first in 0..self.halves.len() {
+            let Tip::Vertex(from) = self.halves[first].from else { continue };
+            let id = BondId(self.graph.bonds.len() as u32);
+            let span = self.halves[first].span;
+            let mut given = None;
+            let mut at = first;
+            let to = loop {
+                let half = &mut self.halves[at];
+                half.bond = Some(id);
+                if let (Some(one), Some(other)) = (given, half.stroke)
+                    && one != other
+                {
+                    d.push(
+                        Diagnostic::error("E0416", half.span, "two strokes on one bond")
+                            .says("drawn at this end here")
+                            .label(span, "and at the other end here")
+                            .because("what is drawn on the two sides of a port is one bond"),
+                    );
+                }
+                given = given.or(half.stroke);
+                let port = match half.to {
+                    Tip::Vertex(joint) => break Some(joint),
+                    Tip::Port(port) => &mut self.ports[port.0 as usize],
+                };
+                port.bond = Some(id);
+                // It came in at one side and goes on at the other.
+                let next = if port.inner == Some(at) { port.outer } else { port.inner };
+                match next {
+                    Some(next) => at = next,
+                    None => break None,
+                }
+            };
+            let Some(to) = to else {
+                // A port is open, which is said where ports are checked.
+                joined[from.vertex.index()].push((id, false, from));
+                self.graph.bonds.push(Bond {
+                    from: End { vertex: from.vertex, port: from.named.unwrap_or(0) },
+                    to: End { vertex: from.vertex, port: from.named.unwrap_or(0) },
+                    given,
+                    domain: Domain::Any,
+                    span,
+                });
+                continue;
+            };
+            if from.vertex == to.vertex {
+                d.push(
+                    Diagnostic::error(
+                        "E0405",
+                        span,
+                        format!("`{}` is joined to itself", self.shown(from.vertex)),
+                    )
+                    .says("a bond joins two different elements"),
+                );
+            }
+            let end = |joint: Joint| End { vertex: joint.vertex, port: joint.named.unwrap_or(0) };
+            self.graph.bonds.push(Bond {
+                from: end(from),
+                to: end(to),
+                given,
+                domain: Domain::Any,
+                span,
+            });
+            joined[from.vertex.index()].push((id, false, from));
+            joined[to.vertex.index()].push((id, true, to));
+        }
+        // What comes out of an open port: an end that has its bond, so that only the port is complained of.
+        for at in 0..self.halves.len() {
+            let half = &self.halves[at];
+            if let (None, Tip::Vertex(to)) = (half.bond, half.to) {
+                let id = BondId(self.graph.bonds.len() as u32);
+                let span = half.span;
+                let end = End { vertex: to.vertex, port: to.named.unwrap_or(0) };
+                self.halves[at].bond = Some(id);
+                joined[to.vertex.index()].push((id, true, to));
+                let domain = Domain::Any;
+                self.graph.bonds.push(Bond { from: end, to: end, given: None, domain, span });
+            }
+        }
+        joined
+    }
+
+    /// Ports that are open on one side.
+    fn check_ports(&self, d: &mut Vec<Diagnostic>) {
+        for port in &self.ports {
+            if port.excused {
+                continue;
+            }
+            let frame = &self.frames[port.frame.0 as usize];
+            let local = port.name.strip_prefix(&frame.prefix).unwrap_or(&port.name);
+            if port.inner.is_none() && !frame.excused.contains(local) {
+                let draw = if port.into { "`{} -> …`" } else { "`… -> {}`" }.replace("{}", local);
+                d.push(
+                    Diagnostic::error(
+                        "E0411",
+                        port.span,
+                        format!("nothing in its model joins the port `{}`", port.name),
+                    )
+                    .says("this port leads nowhere")
+                    .help(format!("join it inside the model: {draw}")),
+                );
+            }
+            if port.outer.is_none() {
+                let root = port.frame == Here::ROOT.frame;
+                let outer = frame.outer.map(|here| &self.frames[here.frame.0 as usize]);
+                if outer.is_some_and(|outer| outer.excused.contains(local)) {
+                    continue;
+                }
+                let draw =
+                    if port.into { "`… -> {}`" } else { "`{} -> …`" }.replace("{}", &port.name);
+                let error = Diagnostic::error(
+                    "E0411",
+                    if root { port.span } else { frame.span },
+                    format!("the port `{}` is left open", port.name),
+                );
+                d.push(match root {
+                    true => error
+                        .says("no bond joins it from outside")
+                        .help("a file with ports is a model for others: import it, and join the ports of an instance"),
+                    false => error
+                        .says("no bond joins this port of the instance")
+                        .label(port.span, "the port")
+                        .help(format!("join it: {draw}")),
+                });
+            }
+        }
+    }
+
+    /// The bonds drawn from one thing to another where names are looked up now.
+    pub fn bonds_between(&self, from: Thing, to: Thing) -> &[BondId] {
+        let drawn = self.between.get_or_init(|| {
+            let mut drawn: HashMap<(Thing, Thing), Vec<BondId>> = HashMap::new();
+            for half in &self.halves {
+                let ends = (half.from.thing(), half.to.thing());
+                drawn.entry(ends).or_default().extend(half.bond);
+            }
+            drawn
+        });
+        drawn.get(&(from, to)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The port that a path names after its element: `Some(None)` when it names none, `None` when it names a wrong one.
     pub fn port(
         &self,
         vertex: VertexId,
-        path: &Path,
+        rest: &[Part],
         d: &mut Vec<Diagnostic>,
     ) -> Option<Option<u32>> {
-        let Some(member) = path.members.first() else { return Some(None) };
+        let Some(member) = rest.first() else { return Some(None) };
         let declaration = self.declarations[vertex.index()];
-        let (name, noun) = (&path.name.text, declaration.element.noun);
-        let span = path.members.iter().fold(member.span, |span, member| span.join(member.span));
+        let (name, noun) = (self.shown(vertex), declaration.element.noun);
+        let span = rest.iter().fold(member.span, |span, member| span.join(member.span));
         let two_port = declaration.element.shape.is_two_port();
         match member.text.as_str() {
-            "1" if two_port && path.members.len() == 1 => return Some(Some(0)),
-            "2" if two_port && path.members.len() == 1 => return Some(Some(1)),
+            "1" if two_port && rest.len() == 1 => return Some(Some(0)),
+            "2" if two_port && rest.len() == 1 => return Some(Some(1)),
             _ => {}
         }
         let error =
@@ -100,40 +505,6 @@ impl Scope<'_> {
         None
     }
 
-    fn join(
-        &mut self,
-        from: Joint,
-        to: Joint,
-        arrow: &Arrow,
-        joined: &mut [Vec<Joined>],
-        d: &mut Vec<Diagnostic>,
-    ) {
-        // Of several ends in a list each has its own place: only the first stands right behind the arrow.
-        let behind = self.map.text(Span { start: arrow.span.end, end: to.whole.start, ..to.whole });
-        let span = if behind.contains(',') { to.whole } else { from.whole.join(to.whole) };
-        let id = BondId(self.graph.bonds.len() as u32);
-        if from.vertex == to.vertex {
-            d.push(
-                Diagnostic::error(
-                    "E0405",
-                    span,
-                    format!("`{}` is joined to itself", self.graph.vertex(from.vertex).name),
-                )
-                .says("a bond joins two different elements"),
-            );
-        }
-        let end = |joint: Joint| End { vertex: joint.vertex, port: joint.named.unwrap_or(0) };
-        self.graph.bonds.push(Bond {
-            from: end(from),
-            to: end(to),
-            given: arrow.stroke,
-            domain: Domain::Any,
-            span,
-        });
-        joined[from.vertex.index()].push((id, false, from));
-        joined[to.vertex.index()].push((id, true, to));
-    }
-
     fn give_ports(
         &mut self,
         id: VertexId,
@@ -143,7 +514,7 @@ impl Scope<'_> {
     ) {
         let declaration = self.declarations[id.index()];
         let shape = declaration.element.shape;
-        let (name, noun) = (&declaration.name.text, declaration.element.noun);
+        let (name, noun) = (self.shown(id).to_string(), declaration.element.noun);
         let bonds: Vec<BondId> = joined.iter().map(|(bond, ..)| *bond).collect();
         if shape.is_two_port() {
             return self.give_two_ports(id, joined, whole, d);
@@ -191,7 +562,7 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) {
         let declaration = self.declarations[id.index()];
-        let (name, noun) = (&declaration.name.text, declaration.element.noun);
+        let (name, noun) = (self.shown(id).to_string(), declaration.element.noun);
         let mut ports: [Option<Joined>; 2] = [None, None];
         let (named, unnamed): (Vec<Joined>, Vec<Joined>) =
             joined.iter().partition(|(_, _, joint)| joint.named.is_some());
@@ -299,7 +670,7 @@ impl Scope<'_> {
                     bond.span,
                     format!(
                         "`{}` and `{}` both impose the {word} of their bond",
-                        from.name.text, to.name.text
+                        self.shown(bond.from.vertex), self.shown(bond.to.vertex)
                     ),
                 )
                 .says(format!("its {word} is set from both ends"))

@@ -1,8 +1,9 @@
 //! Expressions: from names to what they mean.
 
+use super::frames::{FrameId, Round, Thing};
 use super::scope::{Meaning, RESERVED, Scope, a, did_you_mean};
 use crate::bond::graph::*;
-use crate::bond::syntax::{self, Path};
+use crate::bond::syntax::{self, Part, Path};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node, Unary};
 use crate::quantity::nearest;
@@ -19,17 +20,25 @@ pub(super) struct Place<'p> {
     pub own_help: &'p str,
     /// Whom hidden signals belong to, and the statement; `None` where no function with memory can stand.
     pub owner: Option<(&'p str, usize)>,
+    /// Whether what models keep to themselves may be looked at.
+    pub looks_inside: bool,
 }
 
 impl<'p> Place<'p> {
     /// Parameters alone.
     pub fn constant(what: &'static str) -> Place<'p> {
-        Place { constant: Some(what), own: &[], own_help: READ, owner: None }
+        Place { constant: Some(what), own: &[], own_help: READ, owner: None, looks_inside: false }
     }
 
     /// Anything but own variables.
     pub fn free(owner: &'p str, statement: usize) -> Place<'p> {
-        Place { constant: None, own: &[], own_help: READ, owner: Some((owner, statement)) }
+        Place {
+            constant: None,
+            own: &[],
+            own_help: READ,
+            owner: Some((owner, statement)),
+            looks_inside: false,
+        }
     }
 
     /// A law over own variables.
@@ -39,14 +48,23 @@ impl<'p> Place<'p> {
         owner: &'p str,
         statement: usize,
     ) -> Place<'p> {
-        Place { constant: None, own, own_help, owner: Some((owner, statement)) }
+        Place {
+            constant: None,
+            own,
+            own_help,
+            owner: Some((owner, statement)),
+            looks_inside: false,
+        }
     }
 
     /// What is observed: no new states arise by looking.
     pub fn observed() -> Place<'p> {
-        Place { constant: None, own: &[], own_help: READ, owner: None }
+        Place { constant: None, own: &[], own_help: READ, owner: None, looks_inside: true }
     }
 }
+
+/// Terms of a sum.
+const MOST_TERMS: i64 = 1_000_000;
 
 const READ: &str =
     "to read an element's variable write it with the element's name, as in `f(shaft)`";
@@ -81,21 +99,21 @@ impl Scope<'_> {
             syntax::Leaf::Quantity(value, _) => Some(Tree::new(Node::Number(*value), span)),
             syntax::Leaf::Name(path) => self.name(path, place, d),
             syntax::Leaf::Call(call) => self.call(call, span, place, d),
-            // The parser does not make it yet.
-            syntax::Leaf::Sum(_) => None,
+            syntax::Leaf::Sum(sum) => self.sum(sum, span, place, d),
         }
     }
 
     /// What a name alone means.
-    fn name(&self, path: &Path, place: Place<'_>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
+    fn name(&mut self, path: &Path, place: Place<'_>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = path.span;
         let name = path.name.text.as_str();
-        if !path.members.is_empty() {
-            d.push(self.member(path));
-            return None;
+        let plain = path.members.is_empty() && path.name.indices.is_empty();
+        if let Some(value) = self.variable(name).filter(|_| plain) {
+            return Some(Expr::new(Node::Number(value as f64), span));
         }
         let leaf = |leaf| Some(Expr::new(Node::Leaf(leaf), span));
         match name {
+            _ if !plain => {}
             "pi" => return Some(Expr::new(Node::Number(std::f64::consts::PI), span)),
             "time" => {
                 if let Some(what) = place.constant {
@@ -129,64 +147,194 @@ impl Scope<'_> {
             }
             _ => {}
         }
-        match (self.values.get(name), place.constant) {
-            (Some(Meaning::Parameter(id)), _) => leaf(Leaf::Parameter(*id)),
-            (Some(Meaning::Signal(id)), None) => leaf(Leaf::Signal(*id)),
+        let (frame, part) = self.frame_of(path, d)?;
+        let key = self.full_key(part, d)?;
+        let meaning = self.frames[frame.0 as usize].values.get(&*key).copied();
+        match (meaning, place.constant) {
+            (Some(meaning), _) if frame != self.here.frame && !place.looks_inside => {
+                let inner = &self.frames[frame.0 as usize];
+                if !inner.public.contains(&*key) {
+                    d.push(self.private(path, &key, inner.body, meaning));
+                    return None;
+                }
+            }
+            _ => {}
+        }
+        match (meaning, place.constant) {
+            (Some(Meaning::Parameter(id)), _) => leaf(Leaf::Parameter(id)),
+            (Some(Meaning::Signal(id)), None) => leaf(Leaf::Signal(id)),
             (Some(Meaning::Signal(id)), Some(what)) => {
                 let declared = self.graph.signals[id.index()].span;
-                d.push(not_constant(span, name, what).label(declared, "a signal, declared here"));
+                let written = self.map.text(span);
+                d.push(
+                    not_constant(span, written, what).label(declared, "a signal, declared here"),
+                );
                 None
             }
             (None, _) => {
-                if !self.excused.contains(name) {
-                    d.push(self.unknown(name, span, place));
+                if !self.frames[frame.0 as usize].excused.contains(part.text.as_str()) {
+                    d.push(self.unknown(frame, &key, part, place));
                 }
                 None
             }
         }
     }
 
-    fn member(&self, path: &Path) -> Diagnostic {
-        let name = path.name.text.as_str();
-        if self.vertices.contains_key(name) {
-            return Diagnostic::error(
-                "E0208",
-                path.span,
-                format!("`{}` alone is no value", path.text()),
-            )
-            .says("a port")
-            .help(format!("read its effort or flow: `e({0})`, `f({0})`", path.text()));
+    /// The frame in which the last name of a path is looked up, and that name.
+    fn frame_of<'p>(
+        &mut self,
+        path: &'p Path,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<(FrameId, &'p Part)> {
+        let mut frame = self.here.frame;
+        let mut part = &path.name;
+        for next in &path.members {
+            let key = self.full_key(part, d)?;
+            let inner = &self.frames[frame.0 as usize];
+            match inner.things.get(&*key).copied() {
+                Some(Thing::Instance(inside)) => frame = inside,
+                Some(_) => {
+                    let text = self.map.text(path.span);
+                    d.push(
+                        Diagnostic::error(
+                            "E0208",
+                            path.span,
+                            format!("`{text}` alone is no value"),
+                        )
+                        .says("a port")
+                        .help(format!("read its effort or flow: `e({text})`, `f({text})`")),
+                    );
+                    return None;
+                }
+                None => {
+                    if !inner.excused.contains(part.text.as_str()) {
+                        d.push(self.unknown_thing(frame, part, &key));
+                    }
+                    return None;
+                }
+            }
+            part = next;
         }
-        Diagnostic::error(
-            "E0201",
-            path.span,
-            "instances of models are not part of the language yet",
-        )
-        .says("a name within an instance")
+        Some((frame, part))
     }
 
-    fn unknown(&self, name: &str, span: Span, place: Place<'_>) -> Diagnostic {
-        let error =
-            Diagnostic::error("E0208", span, format!("no parameter or signal is called `{name}`"))
-                .says("not declared anywhere");
-        if self.vertices.contains_key(name) {
-            let vertex = self.declarations[self.vertices[name].index()];
-            return error
-                .label(vertex.span, format!("`{name}` is {}", a(vertex.element.noun)))
-                .help(format!("to read its variables write `e({name})`, `f({name})`"));
+    /// The error for what a model keeps to itself.
+    fn private(&self, path: &Path, key: &str, body: usize, meaning: Meaning) -> Diagnostic {
+        let model = &self.bodies[body].name;
+        let error = Diagnostic::error(
+            "E0241",
+            path.span,
+            format!("`{}` is private to its model", self.map.text(path.span)),
+        )
+        .says("read from outside")
+        .label(self.value_span(meaning), "declared here");
+        match meaning {
+            Meaning::Signal(_) => error.help(format!("let the model `{model}` say `output {key}`")),
+            Meaning::Parameter(_) => error.help(format!(
+                "parameters in the brackets after `model {model}` can be read from outside"
+            )),
         }
-        let known = self
+    }
+
+    /// `sum(k in 1..N, term)`
+    fn sum(
+        &mut self,
+        sum: &syntax::Sum,
+        span: Span,
+        place: Place<'_>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr> {
+        let from = self.integer(&sum.range.0, "a bound of a sum", d);
+        let to = self.integer(&sum.range.1, "a bound of a sum", d);
+        let (from, to) = (from?, to?);
+        if to.saturating_sub(from) >= MOST_TERMS {
+            d.push(
+                Diagnostic::error("E0237", span, "the sum has too many terms")
+                    .says(format!("from {from} to {to}"))
+                    .because(format!("at most {MOST_TERMS} terms")),
+            );
+            return None;
+        }
+        let before = self.here;
+        let name: std::rc::Rc<str> = sum.variable.text.as_str().into();
+        let mut terms = vec![];
+        for value in from..=to {
+            let top = self.rounds.len();
+            self.here.round = Some(top as u32);
+            self.rounds.push(Round { name: name.clone(), value, outer: before.round });
+            let term = self.lower(&sum.term, place, d);
+            // Nothing that was lowered looks at the variable again.
+            self.rounds.truncate(top);
+            self.here = before;
+            terms.push(term?);
+        }
+        Some(balanced(terms, span))
+    }
+
+    fn unknown(&self, frame: FrameId, name: &str, part: &Part, place: Place<'_>) -> Diagnostic {
+        let span = part.span;
+        let names = &self.frames[frame.0 as usize];
+        let inside = frame != self.here.frame;
+        let within = match inside {
+            true => format!(" in `{}`", names.prefix.trim_end_matches('.')),
+            false => String::new(),
+        };
+        let mut error = Diagnostic::error(
+            "E0208",
+            span,
+            format!("no parameter or signal is called `{name}`{within}"),
+        )
+        .says("not declared anywhere");
+        if inside {
+            let body = &self.bodies[names.body];
+            error = error.label(body.span, format!("the model `{}`", body.name));
+        }
+        match names.things.get(name) {
+            Some(Thing::Vertex(id)) => {
+                let vertex = self.declarations[id.index()];
+                let name = self.shown(*id);
+                return error
+                    .label(vertex.span, format!("`{name}` is {}", a(vertex.element.noun)))
+                    .help(format!("to read its variables write `e({name})`, `f({name})`"));
+            }
+            Some(Thing::Instance(inner)) => {
+                let inner = &self.frames[inner.0 as usize];
+                return error
+                    .label(inner.span, format!("`{name}` is an instance"))
+                    .help(format!("an output of it is read as `{name}.…`"));
+            }
+            Some(Thing::Port(port)) => {
+                return error
+                    .label(self.ports[port.0 as usize].span, format!("`{name}` is a port"))
+                    .help(format!("to read its variables write `e({name})`, `f({name})`"));
+            }
+            None => {}
+        }
+        let known = names
             .values
             .iter()
-            .filter(|(_, meaning)| {
-                place.constant.is_none() || matches!(meaning, Meaning::Parameter(_))
+            .filter(|(name, meaning)| {
+                (place.constant.is_none() || matches!(meaning, Meaning::Parameter(_)))
+                    && (!inside || names.public.contains(*name))
             })
-            .map(|(name, _)| *name);
-        let mut known: Vec<&str> = known.chain(["time", "pi"]).collect();
+            .map(|(name, _)| name.as_ref());
+        let mut known: Vec<&str> = known.collect();
+        if !inside {
+            known.extend(["time", "pi"]);
+        }
         known.sort_unstable();
+        let base = |known: &&&str| {
+            known.strip_prefix(part.text.as_str()).is_some_and(|rest| rest.starts_with('['))
+        };
+        if let Some(first) = known.iter().find(base) {
+            return match part.indices.is_empty() {
+                true => error.help(format!("`{}` has an index, as in `{first}`", part.text)),
+                false => error.because(format!("the first of them is `{first}`")),
+            };
+        }
         match nearest(name, known) {
             Some(meant) => did_you_mean(error, span, meant),
-            None if RESERVED.contains(&name) => error,
+            None if RESERVED.contains(&name) || inside => error,
             None => error.help(format!("declare it: `param {name} = …`")),
         }
     }
@@ -204,16 +352,23 @@ impl Scope<'_> {
 
     /// The number of a lowered expression of parameters. `None` without an error when one of them has none.
     pub fn evaluate(
-        &self,
+        &mut self,
         expr: &Expr,
         what: &str,
         span: Span,
         d: &mut Vec<Diagnostic>,
     ) -> Option<f64> {
         let mut known = true;
-        expr.leaves(&mut |leaf, _| {
-            known &= matches!(leaf, Leaf::Parameter(id) if self.evaluated[id.index()]);
+        let mut wanted = vec![];
+        expr.leaves(&mut |leaf, _| match leaf {
+            Leaf::Parameter(id) if self.evaluated[id.index()] => {}
+            Leaf::Parameter(id) => wanted.push(id.index()),
+            _ => known = false,
         });
+        for k in wanted {
+            self.demand(k, d);
+            known &= self.evaluated[k];
+        }
         if !known {
             return None;
         }
@@ -238,6 +393,24 @@ impl Scope<'_> {
 fn not_constant(span: Span, name: &str, what: &str) -> Diagnostic {
     Diagnostic::error("E0211", span, format!("`{name}` changes with time, {what} does not"))
         .says("only parameters and numbers can stand here")
+}
+
+/// The sum of terms as a tree that is no deeper than it must be; 0 when there are none.
+fn balanced(mut terms: Vec<Expr>, span: Span) -> Expr {
+    while terms.len() > 1 {
+        let mut halved = Vec::with_capacity(terms.len().div_ceil(2));
+        let mut left = terms.into_iter();
+        while let Some(first) = left.next() {
+            halved.push(match left.next() {
+                Some(second) => first + second,
+                None => first,
+            });
+        }
+        terms = halved;
+    }
+    let mut sum = terms.pop().unwrap_or(Tree::number(0.0));
+    sum.span = span;
+    sum
 }
 
 /// −1·number as a number, so that a literal stays one.

@@ -233,7 +233,7 @@ fn elaborated(text: &str) {
     let file = map.add("test.bg", text);
     let mut d = vec![];
     let file = parse(&map, file, &mut d);
-    let graph = crate::bond::elaborate::elaborate(&file, &map, &Default::default(), &mut d);
+    let graph = crate::bond::elaborate::elaborate(&file.into(), &map, &Default::default(), &mut d);
     assert_eq!(graph.is_none(), crate::diagnostic::has_errors(&d));
     for label in d.iter().flat_map(|d| &d.labels) {
         let span = label.span;
