@@ -146,32 +146,34 @@ impl<'a> Scope<'a> {
 
     /// The arrows of a chain.
     fn draw(&mut self, chain: &Chain, incomplete: &mut HashSet<VertexId>, d: &mut Vec<Diagnostic>) {
-        let mut miss = |scope: &mut Scope<'a>, tip: Option<Tip>| match tip {
-            // The other end has been reported: do not count this one's bonds.
-            Some(Tip::Vertex(joint)) => {
-                incomplete.insert(joint.vertex);
-            }
-            Some(Tip::Port(port)) => scope.ports[port.0 as usize].excused = true,
-            None => {}
-        };
         let mut last: Option<&ChainEnd> = chain.first.last();
         // What an end means is found out once, though it stands behind one arrow and before the next.
         let mut found = last.and_then(|end| self.tip_of(end, d));
         for (arrow, ends) in &chain.links {
-            let from = match (last, &found) {
-                (Some(end), Some(found)) => self.tip(end, found, false, d),
-                _ => None,
-            };
-            let before = last;
+            let before = last.zip(found);
+            let from = before.and_then(|(end, found)| self.tip(end, &found, false, d));
             for end in ends {
                 last = Some(end);
                 found = self.tip_of(end, d);
-                let to = found.as_ref().and_then(|found| self.tip(end, found, true, d));
-                match (from, to) {
-                    (Some(one), Some(other)) => {
-                        self.add_half((before.unwrap_or(end), one), (end, other), arrow, d);
+                let to = found.and_then(|found| self.tip(end, &found, true, d));
+                if let (Some((first, _)), Some(from), Some(to)) = (before, from, to) {
+                    self.add_half((first, from), (end, to), arrow, d);
+                    continue;
+                }
+                // The wrong end has been reported: do not count the bonds of either.
+                for found in [before.map(|(_, found)| found), found].into_iter().flatten() {
+                    match found.thing {
+                        Thing::Vertex(id) => {
+                            incomplete.insert(id);
+                        }
+                        Thing::Port(port) => self.ports[port.0 as usize].excused = true,
+                        Thing::Instance(frame) => {
+                            for at in 0..self.frames[frame.0 as usize].ports.len() {
+                                let port = self.frames[frame.0 as usize].ports[at];
+                                self.ports[port.0 as usize].excused = true;
+                            }
+                        }
                     }
-                    (one, other) => miss(self, one.or(other)),
                 }
             }
         }
