@@ -55,7 +55,6 @@ pub const CODES: &[Code] = &[
     row("N0101", "the rest is not looked at", "After many errors of syntax the text is probably no bond graph; the rest of it is skipped."),
     // -- 02: names and language
     row("E0201", "not part of the language yet", "Models, instances, ports, imports, loops over elements, conditional elements, fields and named regulator loops will be; they cannot be used yet."),
-    row("E0202", "arrays are not part of the language yet", "Names with indices, `ph[2]`, cannot be used yet. Give each element a name of its own."),
     row("E0203", "name is declared twice", "Exactly one occurrence of an element's name carries its kind; elsewhere the name alone means it. Parameters, signals and inputs share one space of names; elements have their own, so `I:L` may take the parameter `L`."),
     row("E0204", "unknown kind of element", "Before the colon stands the kind: 0 1 Se MSe Sf MSf R MR C MC I MI TF MTF GY MGY De Df."),
     row("E0205", "reserved name", "e, f, q, p, time and pi mean something of their own in laws and cannot name parameters or signals. Elements may have these names."),

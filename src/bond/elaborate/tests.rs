@@ -784,16 +784,6 @@ fn functions_and_signals() {
 }
 
 #[test]
-fn what_is_not_there_yet_is_one_error() {
-    errors(&around("model A(x) {\n port in p\n p -> R:r2(1)\n}\nC:c(1) -> m"), &["E0201 model"]);
-    errors(&around("import \"a.bg\""), &["E0201 import"]);
-    errors(&around("for k in 1..3 {\n R:x[k](1)\n m -> x[k]\n}"), &["E0201 for"]);
-    errors(&around("if 1 > 0 { m -> R:z(1) }"), &["E0201 if"]);
-    errors(&around("loop a: f(m) follows b, bandwidth 2 rad/s"), &["E0201 loop"]);
-    errors(&around("signal x = y[1]"), &["E0202 1"]);
-}
-
-#[test]
 fn reciprocals_become_gains_only_where_they_vary() {
     let graph = graph(
         "input u; drive u = 1; param k = 2\n\
