@@ -757,7 +757,7 @@ fn functions_and_signals() {
     errors(&around("signal x = tf([time], [1, 1], f(m))"), &["E0211 time"]);
     let near = errors(&around("signal x = leadlg(f(m), 1, 1)"), &["E0210 leadlg"]);
     assert_eq!(near.d[0].notes, ["its form is `leadlag(x, t_lead, t_lag)`"]);
-    errors(&around("signal x = file(\"a.csv\")"), &["E0210 file"]);
+    errors(&around("signal x = file(\"a.csv\")"), &["E0901 \"a.csv\"", "E0210 file"]);
     errors(&around("signal x = itneg(f(m))"), &["E0210 itneg"]);
     errors(&around("signal x = lag(f(m))"), &["E0216 lag(f(m))"]);
     errors(&around("signal x = pi(f(m), kp = 2)"), &["E0216 kp = 2"]);
