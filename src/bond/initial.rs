@@ -134,6 +134,10 @@ pub fn start(
     }
     contradictions(graph, equations, structure, 0.5 * horizon, &y, d);
     if d[before..].iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
+        // What contradicts is said instead of what it leaves open.
+        if d[before..].iter().any(|said| said.code == "E0501") {
+            d.retain(|said| said.code != "W0510");
+        }
         return None;
     }
     if !structure.constraints.is_empty()

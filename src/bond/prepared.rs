@@ -4,7 +4,7 @@ use super::causality::Causality;
 use super::consistent::{self, Trouble};
 use super::equations::compiled::{Compiled, compile};
 use super::equations::{Equations, Origin, Unknown, equations, unknown_name};
-use super::graph::{BondGraph, Initial, Law, StoreInitial};
+use super::graph::{BondGraph, Initial, Law, Leaf, Storage, StoreInitial, StoreLaw, VertexId};
 use super::structure::{Linearised, Structure, analyse};
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
@@ -30,15 +30,8 @@ pub fn prepare(
     let equations = equations(graph);
     let mut free = compile(&equations, &[]);
     let structure = structure(graph, &equations, &mut free, causality);
-    let names = |rows: &[usize]| elements(graph, &equations, rows);
     if structure.higher > 0 {
-        let rows: Vec<usize> = structure.constraints.iter().flat_map(|c| c.rows.clone()).collect();
-        let span = spans(graph, &equations, &rows).first().copied().unwrap_or(Span::NONE);
-        d.push(
-            Diagnostic::error("E0506", span, "a storage is tied to values whose derivatives nothing determines")
-                .because(format!("the constraint comes from {}", names(&rows)))
-                .help("let an effort or a flow act through an R, a C or an I instead of setting a stored quantity"),
-        );
+        d.push(undetermined_derivative(graph, &equations, &structure));
         return None;
     }
     let pins: Vec<(usize, usize)> = structure
@@ -47,7 +40,9 @@ pub fn prepare(
         .map(|(row, _)| *row)
         .zip(structure.undetermined.iter().copied())
         .collect();
-    if !pins.is_empty() {
+    // Rings of equal junctions have been said by causality, each with the bond that closes it.
+    let rings = d.iter().filter(|said| said.code == "W0405").count();
+    if pins.len() > rings {
         let loose: Vec<String> = (0..equations.unknowns.len())
             .filter(|i| structure.loose[*i])
             .map(|i| unknown_name(graph, equations.unknowns[i]))
@@ -56,13 +51,56 @@ pub fn prepare(
         let span = spans(graph, &equations, &rows).first().copied().unwrap_or(Span::NONE);
         d.push(
             Diagnostic::warning("W0510", span, format!("nothing determines {}", loose.join(", ")))
-                .because(format!("the equations of {} say something twice", names(&rows)))
+                .because(format!(
+                    "the equations of {} say something twice",
+                    elements(graph, &equations, &rows)
+                ))
                 .because("they are taken as if 0 flowed, or stood, in the ring")
                 .help("break the ring, or put an R into it"),
         );
     }
     let compiled = if pins.is_empty() { free } else { compile(&equations, &pins) };
     Some(Prepared { equations, compiled, structure })
+}
+
+/// A storage that must stand still, or follow something, with nothing left that could make it.
+fn undetermined_derivative(
+    graph: &BondGraph,
+    equations: &Equations,
+    structure: &Structure,
+) -> Diagnostic {
+    let rows: Vec<usize> = structure.constraints.iter().flat_map(|c| c.rows.clone()).collect();
+    let span = spans(graph, equations, &rows).first().copied().unwrap_or(Span::NONE);
+    let empty = rows.iter().find_map(|row| match equations.origins.get(*row) {
+        Some(Origin::Vertex(id)) => stores_nothing(graph, *id).then_some(graph.vertex(*id)),
+        _ => None,
+    });
+    if let Some(vertex) = empty {
+        let inertia = matches!(vertex.law, Law::Store { kind: Storage::Inertia, .. });
+        let (what, stored, open) =
+            if inertia { ("inertia", "p", "flow") } else { ("compliance", "q", "effort") };
+        let message = format!("the {what} of {}:{} is 0", vertex.kind, vertex.name);
+        return Diagnostic::error("E0506", vertex.span, message)
+            .says(format!("it stores nothing, and nothing determines its {open}"))
+            .because(format!("{stored} stays 0, so that nothing can move it"))
+            .help("leave the element out, or give it a value above 0");
+    }
+    let names = elements(graph, equations, &rows);
+    Diagnostic::error("E0506", span, "what is stored is prescribed, and nothing is free to move it")
+        .because(format!("prescribed by {names}"))
+        .help("let an effort or a flow act through an R, a C or an I instead of setting a stored quantity")
+}
+
+/// Whether a storage's value is 0 for certain.
+fn stores_nothing(graph: &BondGraph, id: VertexId) -> bool {
+    let Law::Store { law: StoreLaw::Linear(value), .. } = &graph.vertex(id).law else {
+        return false;
+    };
+    let number = value.evaluate(&mut |leaf| match leaf {
+        Leaf::Parameter(id) => graph.parameters[id.index()].value,
+        _ => f64::NAN,
+    });
+    number == 0.0
 }
 
 /// What the equations determine, at the most favourable of some random points.

@@ -8,6 +8,6 @@ mod nearest;
 
 pub use dimension::Dimension;
 pub use domain::{DOMAINS, Domain, DomainRow};
-pub use nearest::nearest;
+pub use nearest::{is_slip, nearest};
 pub use symbols::{PREFIXES, SYMBOLS, Symbol, is_unit_name};
 pub use unit::{Unit, UnitError, scan_unit};

@@ -21,6 +21,23 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
+/// Whether a name is surely a slip of the pen for another: letters of the wrong case, two neighbours swapped, or one
+/// letter too many or too few. A letter or figure in the place of another may be another name, as `R_1` is not `R_2`.
+pub fn is_slip(name: &str, meant: &str) -> bool {
+    if name.to_lowercase() == meant.to_lowercase() {
+        return true;
+    }
+    let (a, b): (Vec<char>, Vec<char>) = (name.chars().collect(), meant.chars().collect());
+    let same = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
+    let (short, long) = if a.len() < b.len() { (&a, &b) } else { (&b, &a) };
+    if short.len() == long.len() {
+        let swapped = a.get(same) == b.get(same + 1) && a.get(same + 1) == b.get(same);
+        return swapped && a.get(same + 2..) == b.get(same + 2..);
+    }
+    let extra = long.get(same).is_some_and(|c| !c.is_ascii_digit());
+    short.len() >= 3 && extra && short.get(same..) == long.get(same + 1..)
+}
+
 /// Twice the edit distance (optimal string alignment), a change of case counting one half.
 fn distance(a: &[char], b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
@@ -49,6 +66,29 @@ fn distance(a: &[char], b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slips_are_told_from_other_names() {
+        for (name, meant) in [
+            ("SQRT", "sqrt"),
+            ("armatuer", "armature"),
+            ("xref", "x_ref"),
+            ("R_etta", "R_eta"),
+            ("Rr", "rR"),
+        ] {
+            assert!(is_slip(name, meant) && is_slip(meant, name), "{name} {meant}");
+        }
+        for (name, meant) in [
+            ("cbrt", "sqrt"),
+            ("R_1", "R_2"),
+            ("R_load1", "R_load"),
+            ("Ki", "Kp"),
+            ("ab", "abc"),
+            ("", "a"),
+        ] {
+            assert!(!is_slip(name, meant) && !is_slip(meant, name), "{name} {meant}");
+        }
+    }
 
     #[test]
     fn likely_slips() {

@@ -64,6 +64,11 @@ impl Moment {
     }
 }
 
+/// A time as people write it: six figures, no more.
+fn six_figures(time: f64) -> f64 {
+    format!("{time:.5e}").parse().unwrap_or(time)
+}
+
 /// The diagnostic for what could not be solved. `span` is the length of the run, for saying how small a step is.
 pub(crate) fn failure(
     system: &System,
@@ -79,12 +84,14 @@ pub(crate) fn failure(
         (_, Moment::Step) => "E0802",
         _ => "E0801",
     };
-    let message = format!("{} at t = {time:.6e} s", moment.text());
+    let when = format!("at t = {} s", six_figures(time));
+    let message = format!("{} {when}", moment.text());
     let mut diagnostic = match trouble {
         Trouble::Modes(device) => {
             let name = system.device_name(*device);
-            Diagnostic::error(code, system.device_span(*device), message)
-                .says(format!("`{name}` switches to and fro without end"))
+            let fights = format!("`{name}` switches to and fro without end {when}");
+            Diagnostic::error(code, system.device_span(*device), fights)
+                .says("its own state changes what it switches by")
                 .because(
                     "no combination of the switches' states agrees with the voltages that it leads to",
                 )
@@ -93,8 +100,10 @@ pub(crate) fn failure(
         Trouble::Cut(Cut::NonFinite { device }) => match device {
             Some(device) => {
                 let name = system.device_name(*device);
-                Diagnostic::error(code, system.device_span(*device), message)
-                    .says(format!("the law of `{name}` or its slope is infinite or no number"))
+                let infinite = format!("the law of `{name}` is no finite number {when}");
+                Diagnostic::error(code, system.device_span(*device), infinite)
+                    .says("it, or its slope, is infinite or no number")
+                    .because(moment.text())
                     .help("look for a division by 0, or a root or logarithm of a negative value")
             }
             None => Diagnostic::error(code, Span::NONE, message)

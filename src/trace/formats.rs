@@ -54,7 +54,7 @@ pub const FORMATS: &[Format] = &[
         about: "a header and one row a point, as pandas.read_csv takes it",
         write: super::csv::write,
         read: super::csv::read,
-        recognises: |_| true,
+        recognises: |bytes| !bytes.contains(&0),
     },
 ];
 
@@ -184,7 +184,8 @@ pub(super) mod tests {
             (b"Title: x\nPlotname: y\n", "E0922"),
             (b"Title: x\nNo. Variables: 99999999999\nNo. Points: 1\nVariables:\n", "E0922"),
             (b"Title: x\nFlags: real\nNo. Variables: 1\nNo. Points: 9\nVariables:\n\t0\ttime\ttime\nBinary:\n12345678", "E0922"),
-            (b"\xff\xfe\x00garbage", "E0921"),
+            (b"\xff\xfegarbage", "E0921"),
+            (b"\xff\xfe\x00garbage", "E0920"),
         ] {
             let text = String::from_utf8_lossy(bytes);
             let error = read("x", bytes).expect_err(&text);

@@ -162,11 +162,13 @@ fn tell_conflict(graph: &BondGraph, conflict: &Conflict) -> Diagnostic {
             "leave the causal stroke out, or put it at the other end",
         ),
     };
+    let drawn = conflict.path.iter().find(|&&bond| graph.bond(bond).given.is_some());
+    if let Some(&bond) = drawn {
+        return tell_stroke(graph, conflict, bond, &what);
+    }
     let message = format!("causal conflict: {what}");
-    let drawn = conflict.path.iter().any(|&bond| graph.bond(bond).given.is_some());
-    let code = if drawn { "E0407" } else { "E0406" };
     let first = conflict.elements.first().map_or(at.span, |&id| graph.vertex(id).span);
-    let mut diagnostic = Diagnostic::error(code, first, message);
+    let mut diagnostic = Diagnostic::error("E0406", first, message);
     for &id in conflict.elements.iter().skip(1).take(MOST) {
         diagnostic = diagnostic.label(graph.vertex(id).span, "");
     }
@@ -174,10 +176,44 @@ fn tell_conflict(graph: &BondGraph, conflict: &Conflict) -> Diagnostic {
         diagnostic =
             diagnostic.because(format!("bonds between them: {}", path(graph, &conflict.path)));
     }
-    if drawn {
-        diagnostic = diagnostic.because("a causal stroke is drawn on one of these bonds");
-    }
     label_path(graph, &conflict.path, diagnostic.help(help))
+}
+
+/// A stroke drawn in the text that the sources exclude. `what` is the conflict that it makes.
+fn tell_stroke(graph: &BondGraph, conflict: &Conflict, drawn: BondId, what: &str) -> Diagnostic {
+    let bond = graph.bond(drawn);
+    let (from, to) = (&graph.vertex(bond.from.vertex).name, &graph.vertex(bond.to.vertex).name);
+    let (giver, other) = match bond.given {
+        Some(Stroke::AtFrom) => (to, format!("{from} ->| {to}")),
+        _ => (from, format!("{from} |-> {to}")),
+    };
+    let message = format!("the causal stroke on {} cannot stand there", graph.bond_name(drawn));
+    let mut diagnostic = Diagnostic::error("E0407", bond.span, message)
+        .says(format!("drawn so that `{giver}` imposes the effort"));
+    // A source on the bond itself says all.
+    let ends = [bond.from.vertex, bond.to.vertex];
+    let source = ends.into_iter().find_map(|id| match graph.vertex(id).law {
+        Law::Source { sets, .. } => Some((id, sets)),
+        _ => None,
+    });
+    match source {
+        Some((id, sets)) => {
+            let word = if sets == Power::Effort { "effort" } else { "flow" };
+            let says = format!("{} imposes the {word}", name(graph, id));
+            diagnostic = diagnostic.label(graph.vertex(id).span, says);
+        }
+        None => {
+            for &id in conflict.elements.iter().take(MOST) {
+                diagnostic = diagnostic.label(graph.vertex(id).span, "");
+            }
+            diagnostic = diagnostic.because(what);
+            if conflict.path.len() > 1 {
+                let path = path(graph, &conflict.path);
+                diagnostic = diagnostic.because(format!("bonds between them: {path}"));
+            }
+        }
+    }
+    diagnostic.help(format!("leave the stroke out, or draw it at the other end: `{other}`"))
 }
 
 fn tell_ring(graph: &BondGraph, ring: &[BondId]) -> Diagnostic {
@@ -219,8 +255,14 @@ fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependen
     }
     let (states, storages) =
         (causality.states.len(), causality.states.len() + causality.dependent.len());
+    let are = if states == 1 { "is a state" } else { "are states" };
+    let count = if storages == 1 {
+        "the only storage is no state".to_string()
+    } else {
+        format!("of {storages} storages {states} {are}")
+    };
     diagnostic
-        .because(format!("of {storages} storages {states} are states"))
+        .because(count)
         .help("the result is right as it stands; a stiff C or a small R between them would make it a state of its own")
 }
 
@@ -228,6 +270,7 @@ fn tell_loop(graph: &BondGraph, found: &AlgebraicLoop) -> Diagnostic {
     let mut members: Vec<String> = found.elements.iter().map(|&id| name(graph, id)).collect();
     let signals = found.signals.iter().map(|&id| &graph.signals[id.index()]);
     members.extend(signals.map(|signal| format!("signal {}", signal.name)));
+    let alone = members.len() == 1;
     let members = list(&members);
     let spans = found.elements.iter().map(|&id| graph.vertex(id).span);
     let spans = spans.chain(found.signals.iter().map(|&id| graph.signals[id.index()].span));
@@ -243,11 +286,15 @@ fn tell_loop(graph: &BondGraph, found: &AlgebraicLoop) -> Diagnostic {
         }
         return diagnostic;
     }
-    let mut diagnostic = Diagnostic::warning(
-        "W0402",
-        span,
-        format!("algebraic loop: {members} determine each other"),
-    );
+    // A loop of junctions and two-ports alone has no members; its bonds are where it stands.
+    let first = found.path.first().map_or(span, |&bond| graph.bond(bond).span);
+    let span = if span.is_none() { first } else { span };
+    let message = match (members.as_str(), alone) {
+        ("", _) => "algebraic loop: junctions and two-ports alone form a ring".to_string(),
+        (one, true) => format!("algebraic loop: {one} determines itself"),
+        (several, false) => format!("algebraic loop: {several} determine each other"),
+    };
+    let mut diagnostic = Diagnostic::warning("W0402", span, message);
     for &span in spans.iter().skip(1) {
         diagnostic = diagnostic.label(span, "");
     }

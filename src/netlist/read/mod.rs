@@ -101,7 +101,7 @@ pub fn read(map: &SourceMap, file: FileId, diagnostics: &mut Vec<Diagnostic>) ->
                             reader.diagnostics.push(Diagnostic::error(
                                 "E0709",
                                 span,
-                                "`.ends` without `.subckt`",
+                                "`.ends` ends no subcircuit",
                             ));
                             None
                         }
@@ -116,12 +116,16 @@ pub fn read(map: &SourceMap, file: FileId, diagnostics: &mut Vec<Diagnostic>) ->
         }
     }
     if let Some(span) = skipping {
-        reader.diagnostics.push(Diagnostic::error("E0709", span, "`.control` without `.endc`"));
+        reader.diagnostics.push(Diagnostic::error(
+            "E0709",
+            span,
+            "the commands after `.control` never end",
+        ));
     }
     while let Some((subcircuit, opening, comment)) = scopes.pop() {
         let name = reader.names.text(subcircuit.name).to_string();
         let error =
-            Diagnostic::error("E0709", opening, format!("`.subckt {name}` without `.ends`"));
+            Diagnostic::error("E0709", opening, format!("the subcircuit `{name}` is never ended"));
         reader.diagnostics.push(error);
         push(
             &mut netlist,
