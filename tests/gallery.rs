@@ -424,7 +424,9 @@ fn what_is_right_runs() {
             String::from_utf8_lossy(&bytes.unwrap_or_default()),
             said.other
         );
-        right_of.extend(codes.into_iter().map(String::from));
+        let gone = bad.said.diagnostics.iter().map(|d| text(d, "code"));
+        let gone = gone.filter(|code| said.diagnostics.iter().all(|d| text(d, "code") != *code));
+        right_of.extend(gone.map(String::from));
     }
     let shown: BTreeSet<String> = gallery()
         .iter()
