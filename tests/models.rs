@@ -472,16 +472,3 @@ fn stated_node_voltages_are_held_at_the_operating_point() {
         assert!((v - 5.0 * (-t / 1e-3).exp()).abs() < 5e-5, "{v} at {t}");
     }
 }
-
-#[test]
-fn conditions_that_may_jump_are_said() {
-    let text = "signal g = if time < 0.5 then 0 else 1\nSe:U(10*g) -> 1:a -> R:r(2), I:l(1)\n\
-                simulate until 1 s step 0.1 s\n";
-    let mut map = bondspice::source::SourceMap::default();
-    let (file, mut d) = (map.add("jump.bg", text), vec![]);
-    bondspice::cli::pipeline::prepare(&mut map, file, &Overrides::default(), None, &mut d)
-        .expect("it compiles");
-    let said: Vec<_> = d.iter().filter(|d| d.code == "W0802").collect();
-    assert_eq!(said.len(), 1, "{d:#?}");
-    assert_eq!(map.text(said[0].labels[0].span), "time < 0.5");
-}

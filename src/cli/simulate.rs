@@ -126,6 +126,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     }
     match result {
         Ok(statistics) => {
+            session.say(statistics.warnings.clone());
             output.to.close(true, session)?;
             say_statistics(arguments, &statistics, session);
             Ok(session.exit())
@@ -137,6 +138,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
                 (FailureKind::Output, _) => Exit::File,
                 (FailureKind::NotSolved, _) => Exit::Simulation,
             };
+            session.say(failure.statistics.warnings.clone());
             if failure.kind == FailureKind::Interrupted {
                 session.remark(&format!("interrupted at t = {} s", failure.time));
             } else {

@@ -181,7 +181,7 @@ pub const CODES: &[Code] = &[
     row("E0851", "the second route cannot go on after a corner", "After a corner of a source no efforts and flows were found that satisfy all laws."),
     row("E0852", "the second route takes too many steps", "The run needs more steps than it is allowed; the laws or sources vary much faster than the run is long."),
     row("W0801", "unknown option", "No option of this name means anything here. It is ignored; the message lists those that are known."),
-    row("W0802", "condition whose jumps are not located", "A law compares, or uses `floor` or `mod`. Where its value jumps there, the solver meets the jump by steps and may pass over a short one. `step`, `pulse` and `pwl` are landed on exactly; the option hmax limits steps."),
+    row("W0803", "solution slides along a condition", "On either side of the condition the solution is led back to it at once: no side lasts, and it would change without end. The run goes on with a ramp in place of the jump, so narrow that the law takes the value between its two branches that keeps the solution there (a relay that chatters, dry friction at rest). The message says how wide. Give the law a slope of your own, or the condition some hysteresis, if the width matters."),
     // -- 09: files and usage
     row("E0901", "no such file", "The file named does not exist. The message names the nearest one in the same folder."),
     row("E0902", "file cannot be read", "The system refused to read the file; its reason stands in the message."),

@@ -1,17 +1,17 @@
 //! Stamps → System: affine laws become static stamps, the rest one program; patterns and places are worked out once.
 
+use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
 use super::laws::LawSet;
 use super::reduce;
-use super::system::{LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
+use super::system::{Guard, LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Dag, Function, Node, NodeId};
+use crate::expr::{Dag, NodeId};
 use crate::linear::{Lu, Pattern};
 use crate::source::Span;
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 
 /// Compiles a circuit's stamps. `None` with diagnostics when no values of its parts could make it solvable: a floating
 /// node, a loop of voltage sources.
@@ -33,52 +33,12 @@ pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
     builder.place_laws();
     builder.reduce();
     let system = builder.finish();
-    warn_of_jumps(stamps, d);
     match check(&system) {
         Ok(()) => Some(system),
         Err(singular) => {
             d.extend(explain::undetermined(&system, &singular));
             None
         }
-    }
-}
-
-/// Conditions are met by steps as they come: one that only bends its law is error control's, but a jump between two
-/// steps may be missed, so whoever wrote it should know.
-fn warn_of_jumps(stamps: &Stamps, d: &mut Vec<Diagnostic>) {
-    let laws = stamps.laws.iter().map(|stamp| &stamp.law);
-    let charges = stamps.charges.iter().filter_map(|charge| charge.law.as_ref());
-    let mut places: Vec<Span> = laws.chain(charges).filter_map(condition).collect();
-    places.sort();
-    places.dedup();
-    for place in places {
-        d.push(
-            Diagnostic::warning("W0802", place, "jumps of this condition are not located")
-                .because("steps are sized by the error of the solution; one may pass over a short interval unseen")
-                .help(
-                    "write jumps in time as `step`, `pulse` or `pwl` (PULSE, PWL), or limit steps by the option hmax; \
-                     a law without a jump there needs nothing",
-                ),
-        );
-    }
-}
-
-/// The first comparison, `floor` or `mod` of a law that stands in a text.
-fn condition(law: &Law) -> Option<Span> {
-    let own = match &*law.node {
-        Node::Binary(op, ..) => op.is_comparison(),
-        Node::Call(function, _) => matches!(function, Function::Floor | Function::Mod),
-        _ => false,
-    };
-    if own && !law.span.is_none() {
-        return Some(law.span);
-    }
-    match &*law.node {
-        Node::Number(_) | Node::Leaf(_) => None,
-        Node::Unary(_, a) | Node::Table(a, _) => condition(a),
-        Node::Binary(_, a, b) => condition(a).or_else(|| condition(b)),
-        Node::Call(_, arguments) => arguments.iter().find_map(condition),
-        Node::If(c, a, b) => condition(c).or_else(|| condition(a)).or_else(|| condition(b)),
     }
 }
 
@@ -102,11 +62,14 @@ struct Builder<'a> {
     /// Charges that others determine.
     dependent: Vec<bool>,
     groups: Vec<(Dag, Vec<Placed>, Option<Junction>)>,
+    conditions: Conditions,
 }
 
 impl<'a> Builder<'a> {
     fn new(stamps: &'a Stamps) -> Builder<'a> {
+        let time = (stamps.unknowns.len() + stamps.charges.len()) as u32;
         let mut builder = Builder {
+            conditions: Conditions::new(time, time + 1 + stamps.modes.len() as u32),
             stamps,
             unknowns: stamps.unknowns.clone(),
             rate_unknowns: BTreeMap::new(),
@@ -153,25 +116,35 @@ impl<'a> Builder<'a> {
         });
     }
 
-    /// Adds a tree with leaves numbered as [`System::inputs`] says. Rates are the added unknowns, or for output columns
-    /// inputs of their own.
-    fn add(&self, dag: &mut Dag, law: &Law, output: bool) -> NodeId {
+    /// The input that a leaf is, numbered as [`System::inputs`] says. Rates are the added unknowns, or for output
+    /// columns inputs of their own, from `rates` on.
+    fn input(&self, leaf: &Leaf, rates: Option<u32>) -> u32 {
         let time = self.time_input() as u32;
-        let modes = self.stamps.modes.len() as u32;
-        let added: Result<NodeId, Infallible> = dag.add(law, &mut |dag, leaf, _| {
-            Ok(dag.input(match leaf {
-                Leaf::Unknown(k) => k.0,
-                Leaf::Time => time,
-                Leaf::Mode(m) => time + 1 + m,
-                Leaf::Rate(k) => match self.rate_unknowns.get(k) {
-                    Some(unknown) if !output || self.dependent[*k as usize] => *unknown,
-                    _ => time + 1 + modes + k,
-                },
-            }))
-        });
-        match added {
-            Ok(node) => node,
+        match leaf {
+            Leaf::Unknown(k) => k.0,
+            Leaf::Time => time,
+            Leaf::Mode(m) => time + 1 + m,
+            Leaf::Rate(k) => match (self.rate_unknowns.get(k), rates) {
+                (Some(unknown), Some(_)) if self.dependent[*k as usize] => *unknown,
+                (_, Some(first)) => first + k,
+                (Some(unknown), None) => *unknown,
+                // Every rate that laws speak of was made an unknown before the first law.
+                (None, None) => time,
+            },
         }
+    }
+
+    /// Inputs for the modes of switches and of the conditions found so far.
+    fn mode_slots(&self) -> usize {
+        self.stamps.modes.len() + SLOTS as usize * self.conditions.list.len()
+    }
+
+    /// Adds a law to the graph of its group, its conditions as modes.
+    fn add(&mut self, dag: &mut Dag, law: &Law, device: DeviceId) -> NodeId {
+        let mut conditions = std::mem::take(&mut self.conditions);
+        let node = conditions.add(dag, law, device, &|leaf| self.input(leaf, None));
+        self.conditions = conditions;
+        node
     }
 
     /// Affine laws go into G, C and the right-hand side; the laws of each junction's device into a group of their own,
@@ -191,7 +164,7 @@ impl<'a> Builder<'a> {
         for stamp in &stamps.laws {
             let into: Vec<(u32, f64)> = stamp.into.iter().map(|(row, f)| (row.0, *f)).collect();
             let group = junctions.get_mut(&stamp.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.0, &stamp.law, false);
+            let node = self.add(&mut group.0, &stamp.law, stamp.device);
             match group.0.affine(node) {
                 Some((constant, factors)) if factors.iter().all(|(input, _)| *input < n) => {
                     for (row, factor) in into {
@@ -213,7 +186,7 @@ impl<'a> Builder<'a> {
         for (k, charge) in stamps.charges.iter().enumerate() {
             let Some(law) = &charge.law else { continue };
             let group = junctions.get_mut(&charge.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.0, law, false);
+            let node = self.add(&mut group.0, law, charge.device);
             match group.0.affine(node) {
                 // A constant part of a charge has no rate, but it belongs to the initial value: keep such a law.
                 Some((constant, factors))
@@ -336,10 +309,8 @@ impl<'a> Builder<'a> {
         let (frozen, node_slots, free_slots) =
             plan_frozen(n, stamps.nodes, &conductances, &charge_rows, &rates, &mut groups);
 
-        let mut dag = Dag::default();
-        let controls: Vec<NodeId> =
-            stamps.modes.iter().map(|mode| self.add(&mut dag, &mode.control, false)).collect();
-        let controls = LawSet::without_derivatives(&dag, &controls);
+        let (modes, controls) = self.modes();
+        let mode_slots = self.mode_slots();
         let mut dag = Dag::default();
         let all: Vec<(String, Law)>;
         let columns = if stamps.outputs.is_empty() {
@@ -354,8 +325,11 @@ impl<'a> Builder<'a> {
         for (_, law) in columns {
             law.leaves(&mut |leaf, _| output_rates |= matches!(leaf, Leaf::Rate(_)));
         }
+        let mut conditions = std::mem::take(&mut self.conditions);
+        let first_rate = Some((time + 1 + mode_slots) as u32);
+        let inputs = |leaf: &Leaf| self.input(leaf, first_rate);
         let nodes: Vec<NodeId> =
-            columns.iter().map(|(_, law)| self.add(&mut dag, law, true)).collect();
+            columns.iter().map(|(_, law)| conditions.add_output(&mut dag, law, &inputs)).collect();
         let output_laws = LawSet::without_derivatives(&dag, &nodes);
         System {
             time_input: time,
@@ -380,16 +354,8 @@ impl<'a> Builder<'a> {
                     into: source.into.iter().map(|(row, factor)| (row.0, *factor)).collect(),
                 })
                 .collect(),
-            modes: stamps
-                .modes
-                .iter()
-                .map(|mode| ModeData {
-                    device: mode.device,
-                    on: mode.on,
-                    off: mode.off,
-                    initial: mode.initial,
-                })
-                .collect(),
+            modes,
+            mode_slots,
             controls,
             output_laws,
             output_rates,
@@ -399,6 +365,48 @@ impl<'a> Builder<'a> {
             free_slots,
             unknowns: self.unknowns,
         }
+    }
+}
+
+impl Builder<'_> {
+    /// The modes of switches and conditions, and the program of their guards: two values each.
+    fn modes(&mut self) -> (Vec<ModeData>, LawSet) {
+        let stamps = self.stamps;
+        let mut conditions = std::mem::take(&mut self.conditions);
+        let (mut modes, mut guards) = (vec![], vec![]);
+        let zero = conditions.guards.constant(0.0);
+        for (slot, mode) in stamps.modes.iter().enumerate() {
+            let inputs = |leaf: &Leaf| self.input(leaf, None);
+            let control = conditions.add_control(&mode.control, mode.device, &inputs);
+            guards.extend([control, zero]);
+            modes.push(ModeData {
+                device: mode.device,
+                span: Span::NONE,
+                slot: slot as u32,
+                guard: Guard::Switch { on: mode.on, off: mode.off, initial: mode.initial },
+                clock: None,
+            });
+        }
+        for (k, condition) in conditions.list.iter().enumerate() {
+            guards.extend(match &condition.clock {
+                Some(_) => [zero, zero],
+                None => [condition.a, condition.b],
+            });
+            modes.push(ModeData {
+                device: condition.device,
+                span: condition.span,
+                slot: (stamps.modes.len() + SLOTS as usize * k) as u32,
+                guard: match condition.question {
+                    Question::Side => Guard::Side,
+                    Question::Cell => Guard::Cell,
+                },
+                clock: condition.clock.clone(),
+            });
+        }
+        let time = self.time_input() as u32;
+        let controls = LawSet::new(&mut conditions.guards, &guards, time);
+        self.conditions = conditions;
+        (modes, controls)
     }
 }
 

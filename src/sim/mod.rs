@@ -3,7 +3,9 @@
 //! [`compile`] once; then [`transient`] or [`operating_point`], as often as wanted. Nothing in here knows text: options
 //! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
 
+mod clocks;
 mod compile;
+mod conditions;
 mod events;
 mod explain;
 mod laws;

@@ -2,6 +2,7 @@
 //!
 //! All buffers are made once; nothing here allocates while a run steps.
 
+use super::events::Track;
 use super::laws::Registers;
 use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
@@ -74,10 +75,12 @@ pub(crate) struct Network<'a> {
     pub system: &'a System,
     /// The segment that each source is on.
     pub segments: Vec<Segment>,
-    /// Each mode, 0 or 1.
+    /// Modes, and the hold and slope of each condition, by their slots.
     pub modes: Vec<f64>,
-    /// How far past its threshold each mode's control may be by the tolerance of event location.
-    pub mode_room: Vec<f64>,
+    /// What is known of each mode's guard.
+    pub tracks: Vec<Track>,
+    /// End of the run.
+    pub stop: f64,
     /// A conductance from every node to ground, while an operating point is sought; otherwise 0.
     pub gmin: f64,
     /// Factor of all sources, while an operating point is sought; otherwise 1.
@@ -96,8 +99,8 @@ pub(crate) struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// At time `t`, all modes 0.
-    pub fn new(system: &'a System, t: f64) -> Network<'a> {
+    /// At time `t` of a run that ends at `stop`, all modes 0.
+    pub fn new(system: &'a System, t: f64, stop: f64) -> Network<'a> {
         let groups = system
             .groups
             .iter()
@@ -111,8 +114,9 @@ impl<'a> Network<'a> {
         Network {
             system,
             segments: system.sources.iter().map(|s| s.waveform.segment(t)).collect(),
-            modes: vec![0.0; system.modes.len()],
-            mode_room: vec![0.0; system.modes.len()],
+            modes: vec![0.0; system.mode_slots],
+            tracks: vec![Track::default(); system.modes.len()],
+            stop,
             gmin: 0.0,
             drive: 1.0,
             pin_initial: false,
@@ -127,18 +131,24 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// The next corner of any source; infinite when there is none.
+    /// The next corner of any source, or change of a condition over time; infinite when there is none.
     pub fn next_corner(&self) -> f64 {
-        self.segments.iter().fold(f64::INFINITY, |first, segment| first.min(segment.end))
+        let sources = self.segments.iter().map(|segment| segment.end);
+        let clocks = self.tracks.iter().map(|track| track.next);
+        sources.chain(clocks).fold(f64::INFINITY, f64::min)
     }
 
-    /// Moves each source whose segment ends at or just before `t` to its next one.
+    /// Moves each source whose segment ends at or just before `t` to its next one, and conditions over time on.
     pub fn pass_corner(&mut self, t: f64, slack: f64) {
+        let mut corner = false;
         for (segment, source) in self.segments.iter_mut().zip(&self.system.sources) {
             while segment.end <= t + slack {
                 *segment = source.waveform.segment(segment.end);
+                corner = true;
             }
         }
+        self.statistics.corners += u64::from(corner);
+        self.set_clocks(t, Some(slack));
     }
 
     fn set_inputs(&mut self, x: &[f64], t: f64) {
@@ -438,13 +448,35 @@ impl<'a> Network<'a> {
         self.factored_alpha = None;
     }
 
-    /// Controls of the modes.
+    /// Forgets that the factors at hand are of the present matrix.
+    pub fn forget_constant_factors(&mut self) {
+        self.factored_alpha = None;
+    }
+
+    /// Guards of the modes, two values each.
     pub fn controls(&mut self, x: &[f64], t: f64, out: &mut [f64]) {
         if out.is_empty() {
             return;
         }
         self.set_inputs(x, t);
         self.system.controls.values(&self.inputs, &mut self.control_registers, out);
+    }
+
+    /// Of each value of the guards, what errors of the unknowns as large as `errors` make of it.
+    pub fn control_noise(&mut self, x: &[f64], t: f64, errors: &[f64]) -> Vec<f64> {
+        let laws = &self.system.controls;
+        let mut values = vec![0.0; 2 * self.system.modes.len()];
+        let mut partials = vec![0.0; laws.partials()];
+        self.set_inputs(x, t);
+        laws.full(&self.inputs, &mut self.control_registers, &mut values, &mut partials);
+        let part = |p: usize| (partials[p] * errors[laws.input(p)]).abs();
+        (0..values.len()).map(|o| laws.row(o).map(part).sum()).collect()
+    }
+
+    /// Appends the values of all laws at a point.
+    pub fn law_values(&mut self, x: &[f64], t: f64, out: &mut Vec<f64>) {
+        self.evaluate(x, t);
+        out.extend(self.groups.iter().flat_map(|group| &group.values));
     }
 
     /// Output columns.

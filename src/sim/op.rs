@@ -4,7 +4,7 @@
 //! have no rate (operating point). Where an operating point would be singular because of storages only (an integrator
 //! nothing feeds back to), those storages keep their initial values.
 
-use super::events::settle_modes;
+use super::events::{Slide, settle_modes};
 use super::network::Network;
 use super::newton::{Cut, Frozen, Scratch, solve_frozen};
 use crate::circuit::DeviceId;
@@ -83,11 +83,12 @@ pub(crate) fn consistent_values(
     network: &mut Network,
     state: &mut State,
     floors: &[f64],
+    slides: &mut Vec<Slide>,
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let held = &network.system.held;
     let targets = state.q.clone();
-    let result = settle_modes(network, state, |network, state| {
+    let result = settle_modes(network, state, slides, |network, state| {
         find(network, held, &targets, floors, state, false, scratch)
     });
     if result.is_err() {
@@ -103,11 +104,12 @@ pub(crate) fn operating_point(
     network: &mut Network,
     state: &mut State,
     floors: &[f64],
+    slides: &mut Vec<Slide>,
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
     network.pin_initial = true;
-    let result = settle_modes(network, state, |network, state| {
+    let result = settle_modes(network, state, slides, |network, state| {
         let mut held = vec![false; network.system.charges()];
         loop {
             match find(network, &held, &targets, floors, state, true, scratch) {

@@ -1,10 +1,11 @@
 //! What a run cost: counters that are the same on every machine.
 
+use crate::diagnostic::Diagnostic;
 use serde::Serialize;
 use std::fmt;
 
 /// Counters of one run.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
     /// The integration method that ran.
     pub method: String,
@@ -32,14 +33,19 @@ pub struct Statistics {
     pub solves: u64,
     /// Newton iterations of implicit steps, of starts and of operating points.
     pub iterations: u64,
-    /// Events located (switches).
+    /// Changes of switches and of conditions.
     pub events: u64,
+    /// Conditions that became ramps because no side of them lasted.
+    pub slides: u64,
     /// Corners of sources landed on.
     pub corners: u64,
     /// Rows written.
     pub rows: u64,
     /// Accepted steps of the pilot pass that finds the magnitudes of the unknowns.
     pub pilot: u64,
+    /// What whoever started the run should know.
+    #[serde(skip)]
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// Why steps were cut.
@@ -119,6 +125,9 @@ impl fmt::Display for Statistics {
         writeln!(f, "solves           {}", self.solves)?;
         writeln!(f, "iterations       {}", self.iterations)?;
         writeln!(f, "corners, events  {}, {}", self.corners, self.events)?;
+        if self.slides > 0 {
+            writeln!(f, "sliding          {} conditions", self.slides)?;
+        }
         write!(f, "rows             {}", self.rows)
     }
 }

@@ -10,6 +10,7 @@
 //! A row of F that belongs to a charge left free reads `w_k = 0` instead (operating point), which is why the pattern
 //! keeps a place for it.
 
+use super::clocks::Clock;
 use super::laws::LawSet;
 use crate::circuit::stamps::{DeviceLabel, Junction, Unknown};
 use crate::circuit::{DeviceId, Waveform};
@@ -141,13 +142,29 @@ pub(crate) struct Source {
     pub into: Vec<(u32, f64)>,
 }
 
-/// Thresholds of a mode; its control is a value of [`System::controls`].
+/// What a mode follows: two values a and b of [`System::controls`], b being 0 for switches and cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Guard {
+    /// A switch: 1 when a rises through `on`, 0 when it falls through `off`.
+    Switch { on: f64, off: f64, initial: Option<bool> },
+    /// The side of a − b: −1, 0 or 1.
+    Side,
+    /// The largest whole number not above a.
+    Cell,
+}
+
+/// A mode.
 #[derive(Clone, Debug)]
 pub(crate) struct ModeData {
+    /// The device that it is of, or in whose law its condition stands first.
     pub device: DeviceId,
-    pub on: f64,
-    pub off: f64,
-    pub initial: Option<bool>,
+    /// The condition in its text.
+    pub span: Span,
+    /// Its place among a network's modes; the hold and the slope of a condition stand behind it.
+    pub slot: u32,
+    pub guard: Guard,
+    /// Where it follows from time alone.
+    pub clock: Option<Clock>,
 }
 
 /// A matrix's pattern with its static part.
@@ -192,6 +209,9 @@ pub struct System {
     pub(crate) groups: Vec<LawGroup>,
     pub(crate) sources: Vec<Source>,
     pub(crate) modes: Vec<ModeData>,
+    /// Number of inputs that modes, holds and slopes are.
+    pub(crate) mode_slots: usize,
+    /// Guards of the modes, two values each.
     pub(crate) controls: LawSet,
     pub(crate) output_laws: LawSet,
     /// Whether output columns speak of rates dQ/dt.
@@ -237,7 +257,7 @@ impl System {
 
     /// Number of inputs of the programs: unknowns (with room up to `time_input`), time, modes, rates.
     pub(crate) fn inputs(&self) -> usize {
-        self.time_input + 1 + self.modes.len() + self.charges()
+        self.time_input + 1 + self.mode_slots + self.charges()
     }
 
     /// What an input of the programs is called.
@@ -247,10 +267,12 @@ impl System {
             self.unknowns[input].name.clone()
         } else if input == time {
             "time".into()
-        } else if input <= time + self.modes.len() {
-            format!("mode({})", self.device_name(self.modes[input - time - 1].device))
+        } else if input <= time + self.mode_slots {
+            let slot = (input - time - 1) as u32;
+            let mode = self.modes.iter().rev().find(|mode| mode.slot <= slot);
+            format!("mode({})", mode.map_or("?", |mode| self.device_name(mode.device)))
         } else {
-            let charge = self.charge_devices[input - time - 1 - self.modes.len()];
+            let charge = self.charge_devices[input - time - 1 - self.mode_slots];
             format!("d/dt({})", self.device_name(charge))
         }
     }
@@ -341,7 +363,16 @@ impl fmt::Display for System {
         }
         for mode in &self.modes {
             let device = self.device_name(mode.device);
-            writeln!(f, "mode of {device}: on above {:e}, off below {:e}", mode.on, mode.off)?;
+            match mode.guard {
+                Guard::Switch { on, off, .. } => {
+                    writeln!(f, "mode of {device}: on above {on:e}, off below {off:e}")?;
+                }
+                guard => {
+                    let what = if guard == Guard::Side { "a side" } else { "a whole number" };
+                    let when = if mode.clock.is_some() { ", known beforehand" } else { "" };
+                    writeln!(f, "mode of a condition of {device}: {what}{when}")?;
+                }
+            }
         }
         Ok(())
     }

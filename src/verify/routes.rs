@@ -63,7 +63,10 @@ pub fn circuit_route(netlist: &Netlist, reltol: f64, d: &mut Vec<Diagnostic>) ->
     let names = names.chain(stamps.outputs.iter().map(|output| output.0.clone())).collect();
     let mut trace = Trace::new(names, vec![]);
     match sim::transient(&system, &settings, &mut trace) {
-        Ok(_) => Some(trace),
+        Ok(statistics) => {
+            d.extend(statistics.warnings);
+            Some(trace)
+        }
         Err(failure) => {
             d.push(*failure.diagnostic);
             None

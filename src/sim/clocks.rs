@@ -1,0 +1,152 @@
+//! Conditions over time alone: their modes and the times at which they change, known beforehand.
+//!
+//! Where a − b is constant + slope·t + Σ factor·mode, as in `mod(time, T) < D`, the time of a change is the root of a
+//! straight line: it is exact but for rounding, however long the run. Otherwise (`sin(w*time) > 0`) the run is searched
+//! on a grid and the change found by bisection to the last bit. All values are those just after their time.
+
+use super::conditions::Question;
+use crate::circuit::stamps::{Law, Leaf};
+use crate::expr::values::sign;
+use crate::expr::{Binary, Dag, NodeId};
+
+/// A condition over time alone.
+#[derive(Clone, Debug)]
+pub(crate) struct Clock {
+    question: Question,
+    shape: Shape,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    /// constant + slope·t + Σ factor·mode; modes by their place among a network's modes.
+    Line { constant: f64, slope: f64, terms: Vec<(u32, f64)> },
+    /// Anything else: a and b.
+    Curve(Box<[Law; 2]>),
+}
+
+/// How many intervals a run is searched in for changes that have no closed form.
+const GRID: f64 = 16384.0;
+
+/// What is read of a curve exactly on a change is read this part of the run later.
+const AFTER: f64 = 1e-12;
+
+impl Clock {
+    /// The clock of a condition with the guards `a` and `b`, `trees` in the law. `time` is the input that time is; the
+    /// modes follow it.
+    pub fn new(
+        question: Question,
+        guards: &mut Dag,
+        [a, b]: [NodeId; 2],
+        trees: [Law; 2],
+        time: u32,
+    ) -> Clock {
+        let difference = guards.binary(Binary::Subtract, a, b);
+        let shape = match guards.affine(difference) {
+            Some((constant, factors)) => {
+                let slope = factors.iter().find(|(k, _)| *k == time).map_or(0.0, |(_, f)| *f);
+                let modes = factors.iter().filter(|(k, _)| *k > time);
+                let terms = modes.map(|(k, f)| (k - time - 1, *f)).collect();
+                Shape::Line { constant, slope, terms }
+            }
+            None => Shape::Curve(Box::new(trees)),
+        };
+        Clock { question, shape }
+    }
+
+    /// Whether its changes are searched for, and do not depend on other modes.
+    pub fn is_searched(&self) -> bool {
+        matches!(self.shape, Shape::Curve(_))
+    }
+
+    /// Its mode just after `t`.
+    pub fn value(&self, t: f64, modes: &[f64], stop: f64) -> f64 {
+        match &self.shape {
+            Shape::Line { constant, slope, terms } => {
+                let (mut at, mut size) = (constant + slope * t, constant.abs());
+                size += (slope * t).abs();
+                for (k, factor) in terms {
+                    let term = factor * modes.get(*k as usize).copied().unwrap_or(0.0);
+                    at += term;
+                    size += term.abs();
+                }
+                self.of_line(at, 8.0 * f64::EPSILON * size, *slope)
+            }
+            Shape::Curve(guards) => {
+                let now = self.of_curve(guards, t);
+                if now == 0.0 { self.of_curve(guards, t + AFTER * stop) } else { now }
+            }
+        }
+    }
+
+    /// The time after `t` at which the mode changes from `value`; infinite when it does not.
+    pub fn next(&self, t: f64, value: f64, modes: &[f64], stop: f64) -> f64 {
+        let next = match &self.shape {
+            Shape::Line { slope: 0.0, .. } => f64::INFINITY,
+            Shape::Line { constant, slope, terms } => {
+                let term = |(k, factor): &(u32, f64)| {
+                    factor * modes.get(*k as usize).copied().unwrap_or(0.0)
+                };
+                let offset = constant + terms.iter().map(term).sum::<f64>();
+                let edge = match self.question {
+                    Question::Side => 0.0,
+                    Question::Cell if *slope > 0.0 => value + 1.0,
+                    Question::Cell => value,
+                };
+                (edge - offset) / slope
+            }
+            Shape::Curve(guards) => self.search(guards, t, value, stop),
+        };
+        if next > t { next } else { f64::INFINITY }
+    }
+
+    /// The mode where the line stands at `at`, give or take `rounding`, and goes on with its slope.
+    fn of_line(&self, at: f64, rounding: f64, slope: f64) -> f64 {
+        match self.question {
+            Question::Side if at.abs() <= rounding => sign(slope),
+            Question::Side => sign(at),
+            Question::Cell if (at - at.round()).abs() <= rounding => {
+                if slope < 0.0 {
+                    at.round() - 1.0
+                } else {
+                    at.round()
+                }
+            }
+            Question::Cell => at.floor(),
+        }
+    }
+
+    fn of_curve(&self, [a, b]: &[Law; 2], t: f64) -> f64 {
+        let at = |law: &Law| {
+            law.evaluate(&mut |leaf| if matches!(leaf, Leaf::Time) { t } else { f64::NAN })
+        };
+        let value = match self.question {
+            Question::Side => sign(at(a) - at(b)),
+            Question::Cell => at(a).floor(),
+        };
+        // What is no number is for the laws to say.
+        if value.is_nan() { 0.0 } else { value }
+    }
+
+    fn search(&self, guards: &[Law; 2], t: f64, value: f64, stop: f64) -> f64 {
+        // Away from round fractions of the run, where changes are wont to be.
+        let place = |i: f64| stop * (i + 0.382) / GRID;
+        let mut i = (t / stop * GRID - 0.382).floor() + 1.0;
+        let mut left = t;
+        while left < stop {
+            let right = place(i).min(stop);
+            if right > left && self.of_curve(guards, right) != value {
+                let (mut a, mut b) = (left, right);
+                loop {
+                    let middle = 0.5 * (a + b);
+                    if middle <= a || middle >= b {
+                        return b;
+                    }
+                    if self.of_curve(guards, middle) == value { a = middle } else { b = middle }
+                }
+            }
+            left = left.max(right);
+            i += 1.0;
+        }
+        f64::INFINITY
+    }
+}

@@ -1,0 +1,240 @@
+//! Restarts of a run: consistent values at its start, after corners and after events.
+
+use super::{Run, count_system};
+use crate::circuit::Waveform;
+use crate::sim::explain::{Failure, Moment, failure};
+use crate::sim::methods::{self, Method};
+use crate::sim::newton::{Cut, Stage, solve_stage};
+use crate::sim::op::{self, Trouble};
+
+/// The part of the tolerance that each step gets where the circuit is of index 2.
+const INDEX_2_PART: f64 = 0.05;
+
+/// No step is longer than this part of a source's period. Where the circuit is of index 2, currents are rates of what
+/// the sources prescribe, and no error test sees them.
+const SIGHT: f64 = 0.25;
+const INDEX_2_SIGHT: f64 = 0.02;
+
+/// The highest frequency that a source swings with after a moment; 0 where it does not.
+fn swings(waveform: &Waveform, t: f64) -> f64 {
+    let frequency = match waveform {
+        Waveform::Sine { amplitude, frequency, delay, .. } if *amplitude != 0.0 && t >= *delay => {
+            frequency.abs()
+        }
+        Waveform::Sffm { amplitude, carrier, index, signal, .. } if *amplitude != 0.0 => {
+            carrier.abs() + (index * signal).abs()
+        }
+        _ => 0.0,
+    };
+    if frequency.is_finite() { frequency } else { 0.0 }
+}
+
+impl Run<'_> {
+    pub(super) fn start(&mut self) -> Result<(), Failure> {
+        let network = &mut self.network;
+        network.start_modes(0.0);
+        self.state = op::initial_values(network, 0.0);
+        if !self.settings.uic {
+            let scratch = &mut self.work.scratch;
+            let mut slides = vec![];
+            let (state, floors) = (&mut self.state, &self.floors);
+            op::operating_point(network, state, floors, &mut slides, scratch).map_err(
+                |trouble| {
+                    failure(
+                        network.system,
+                        Moment::OperatingPoint,
+                        0.0,
+                        &trouble,
+                        &network.statistics,
+                    )
+                },
+            )?;
+        }
+        self.restart(Moment::Start)?;
+        let (method, reason) = methods::choose(&self.network, self.index2);
+        let (method, reason) = match self.settings.method {
+            Method::Auto => (method, reason),
+            Method::Rodas4 | Method::Rodas5p if self.index2 => (method, reason),
+            asked => (asked, "asked for"),
+        };
+        self.method = method;
+        count_system(&mut self.network, method.name(), reason);
+        let span = self.distance();
+        self.h = self.settings.h0.unwrap_or(1e-3 * span).min(span);
+        self.rows_first()?;
+        self.rows_at_state()
+    }
+
+    /// Consistent values for the charges of `state`.
+    pub(super) fn restart(&mut self, moment: Moment) -> Result<(), Failure> {
+        self.work.before = None;
+        self.work.linearised = false;
+        self.last = None;
+        self.fresh = true;
+        self.smoothed = false;
+        let network = &mut self.network;
+        let (floors, scratch) = (&self.floors, &mut self.work.scratch);
+        let mut slides = vec![];
+        let found = op::consistent_values(network, &mut self.state, floors, &mut slides, scratch);
+        match found {
+            Ok(()) => {
+                if self.index2 {
+                    self.index2 = false;
+                    self.untested.fill(false);
+                }
+            }
+            Err(Trouble::Cut(Cut::Singular(singular))) => {
+                let n = self.network.system.equations();
+                self.index2 = true;
+                self.untested.fill(false);
+                for column in singular.columns.iter().flatten() {
+                    if let Some(untested) =
+                        self.untested.get_mut(*column as usize).filter(|_| (*column as usize) < n)
+                    {
+                        *untested = true;
+                    }
+                }
+                if matches!(self.method, Method::Rodas4 | Method::Rodas5p) {
+                    self.method = Method::TrBdf2;
+                    self.network.statistics.method = Method::TrBdf2.name().into();
+                    self.network.statistics.reason =
+                        "the circuit is of index 2 after an event".into();
+                }
+                self.weigh();
+                self.redistribute(moment)?;
+            }
+            Err(trouble) => {
+                let time = self.state.t;
+                return Err(failure(network.system, moment, time, &trouble, &network.statistics));
+            }
+        }
+        self.weigh();
+        self.look_ahead();
+        for slide in &slides {
+            self.say_slide(slide);
+        }
+        let Run { network, state, controls, absolute, .. } = self;
+        network.controls(&state.x, state.t, &mut controls.left);
+        if self.watches {
+            if moment == Moment::Start {
+                network.hold_all(&controls.left);
+            }
+            network.see_noise(&state.x, state.t, absolute);
+            network.see_guards(&controls.left);
+        }
+        Ok(())
+    }
+
+    /// Sets the longest step by the periods of the sources that swing.
+    fn look_ahead(&mut self) {
+        let part = if self.index2 { INDEX_2_SIGHT } else { SIGHT };
+        let sources = self.network.system.sources.iter();
+        let fastest = sources.map(|source| swings(&source.waveform, self.state.t));
+        self.sight = part / fastest.fold(0.0, f64::max);
+    }
+
+    /// Three short steps of the backward Euler method: the first lets charges jump to where loops of capacitors and
+    /// sources want them, the others give the currents that flow from there on. The straight line through those two
+    /// leads back to the moment itself, so that nothing starts late.
+    pub(super) fn redistribute(&mut self, moment: Moment) -> Result<(), Failure> {
+        let full = 1e-6 * self.distance();
+        let start = self.state.clone();
+        let mut outcome = Err(Cut::NoConvergence { worst: 0 });
+        for shrink in [1.0, 1e-2, 1e-4] {
+            self.state.copy_from(&start);
+            outcome = self.jump(full * shrink);
+            if outcome.is_ok() {
+                return Ok(());
+            }
+        }
+        match outcome {
+            Ok(()) => Ok(()),
+            Err(cut) => {
+                let network = &self.network;
+                let trouble = Trouble::Cut(cut);
+                Err(failure(network.system, moment, start.t, &trouble, &network.statistics))
+            }
+        }
+    }
+
+    fn jump(&mut self, h: f64) -> Result<(), Cut> {
+        let start = self.state.t;
+        self.euler(h)?;
+        self.euler(h)?;
+        let near = self.state.clone();
+        self.euler(h)?;
+        let back = |far: &mut [f64], near: &[f64]| {
+            for (far, near) in far.iter_mut().zip(near) {
+                *far = 3.0 * near - 2.0 * *far;
+            }
+        };
+        back(&mut self.state.x, &near.x);
+        back(&mut self.state.q, &near.q);
+        back(&mut self.state.w, &near.w);
+        self.state.t = start;
+        Ok(())
+    }
+
+    fn euler(&mut self, h: f64) -> Result<(), Cut> {
+        let Run { network, state, next, work, weights, .. } = self;
+        let alpha = 1.0 / h;
+        for (beta, q) in work.beta.iter_mut().zip(&state.q) {
+            *beta = -alpha * q;
+        }
+        next.copy_from(state);
+        next.t = state.t + h;
+        network.remember_junctions(&state.x);
+        let stage = Stage {
+            t: next.t,
+            alpha,
+            beta: &work.beta,
+            weights,
+            tolerance: methods::trbdf2::ITERATION,
+        };
+        solve_stage(network, &stage, &mut next.x, &mut next.q, &mut work.scratch)?;
+        for (k, w) in next.w.iter_mut().enumerate() {
+            *w = alpha * next.q[k] + work.beta[k];
+        }
+        std::mem::swap(state, next);
+        Ok(())
+    }
+
+    /// Takes the values of `state` into the weights.
+    pub(super) fn weigh(&mut self) {
+        // A method of order 2 makes more of the errors of its steps: over a run they add up to reltol^(2/3).
+        let part = if self.index2 { INDEX_2_PART } else { 1.0 };
+        let reltol = self.settings.reltol;
+        for (k, x) in self.state.x.iter().enumerate() {
+            self.largest[k] = self.largest[k].max(x.abs());
+            self.weights[k] = if self.untested[k] {
+                f64::INFINITY
+            } else {
+                (part * (reltol * self.largest[k] + self.absolute[k])).max(f64::MIN_POSITIVE)
+            };
+        }
+    }
+
+    /// Moves sources to their next segments and finds the values after the corner.
+    pub(super) fn pass_corner(&mut self) -> Result<(), Failure> {
+        self.network.pass_corner(self.state.t, self.smallest);
+        let events = self.network.statistics.events;
+        let before = self.rows.is_some().then(|| self.state.x.clone());
+        self.restart(Moment::Restart)?;
+        self.shorten();
+        // A second row only where something jumped.
+        let jumped = before.is_some_and(|before| {
+            before
+                .iter()
+                .zip(&self.state.x)
+                .zip(&self.weights)
+                .any(|((a, b), weight)| (a - b).abs() > *weight)
+        });
+        if jumped || self.network.statistics.events != events { self.row_here() } else { Ok(()) }
+    }
+
+    /// A careful first step after a corner or event.
+    pub(super) fn shorten(&mut self) {
+        let span = self.distance();
+        self.h = (0.5 * self.h).min(0.1 * span).max(self.smallest);
+    }
+}
