@@ -349,8 +349,28 @@ pub struct BondGraph {
     pub vertices: Vec<Vertex>,
     /// Bonds, in file order.
     pub bonds: Vec<Bond>,
+    /// What regulates what, in file order.
+    pub regulators: Vec<Regulator>,
     /// What a plain run does.
     pub experiment: Experiment,
+}
+
+/// A signal that regulates, and what for: nothing that a simulation needs, but what the design of its gains starts
+/// from.
+#[derive(Clone, Debug)]
+pub struct Regulator {
+    /// The signal, made with `pi` or `pid`.
+    pub signal: SignalId,
+    /// What it controls.
+    pub controlled: Expr,
+    /// What that shall follow.
+    pub reference: Expr,
+    /// The bandwidth wanted, rad/s.
+    pub bandwidth: Option<f64>,
+    /// The phase margin wanted, rad.
+    pub margin: Option<f64>,
+    /// Where it stands.
+    pub span: Span,
 }
 
 impl BondGraph {

@@ -9,7 +9,7 @@ use crate::bond::initial::{self, InitialState};
 use crate::bond::syntax;
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{Analysis, Circuit};
-use crate::diagnostic::{Diagnostic, has_errors};
+use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::netlist::header::Header;
 use crate::netlist::{Netlist, flatten, read, write};
 use crate::quantity::nearest;
@@ -119,7 +119,10 @@ fn check_options(syntax: &syntax::File, overrides: &Overrides, d: &mut Vec<Diagn
 
 /// The causality of a graph.
 pub fn causality(graph: &BondGraph, d: &mut Vec<Diagnostic>) -> Option<Causality> {
-    causality::assign(graph, d)
+    let before = d.len();
+    let causality = causality::assign(graph, d);
+    merge_repeats(d, before);
+    causality
 }
 
 /// A bond graph with all that is known before it runs.

@@ -91,6 +91,7 @@ pub const CODES: &[Code] = &[
     row("E0239", "model contains itself", "An instance of a model within itself, directly or through other models, would never end."),
     row("E0240", "unknown domain", "The domains are those of the table in the language reference, such as electrical, rotation, translation, hydraulic and thermal."),
     row("E0241", "private to its model", "From outside a model its outputs and the parameters of its brackets can be used. What is observed may look at everything."),
+    row("E0242", "not a regulator", "`loop` names a regulator: a signal made with `pi` or `pid` alone, whose gains are to be designed."),
     row("E0250", "argument out of its range", "The argument of the function must be above 0, or not below 0, as the message says: a time constant, a frequency, a duration."),
     row("E0251", "abscissae of a table do not rise", "A table says one value for each abscissa, in rising order; between them it goes in straight lines, beyond them it holds its end values."),
     row("E0252", "file of a table cannot be read", "A table's file has two columns of numbers in SI, separated by commas (or semicolons, or blanks). A first line without numbers is a header; a unit in square brackets in it holds for its column. Lines that begin with `#` are skipped."),

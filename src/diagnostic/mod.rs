@@ -8,6 +8,8 @@ pub mod gallery;
 pub mod render;
 
 use crate::source::Span;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -124,6 +126,41 @@ impl Diagnostic {
     pub fn fix(mut self, title: impl Into<String>, edits: Vec<(Span, String)>) -> Diagnostic {
         self.fix = Some(Fix { title: title.into(), edits });
         self
+    }
+}
+
+/// Makes one of what is said again and again of one place, as of each instance of a model, from `first` on.
+pub fn merge_repeats(diagnostics: &mut Vec<Diagnostic>, first: usize) {
+    let mut known: HashMap<(&'static str, Vec<Span>), usize> = HashMap::new();
+    let mut kept: Vec<(Diagnostic, usize, String)> = vec![];
+    for diagnostic in diagnostics.drain(first..) {
+        let spans: Vec<Span> = diagnostic.labels.iter().map(|label| label.span).collect();
+        let same = match spans.is_empty() {
+            true => None,
+            false => match known.entry((diagnostic.code, spans)) {
+                Entry::Occupied(entry) => Some(*entry.get()),
+                Entry::Vacant(entry) => {
+                    entry.insert(kept.len());
+                    None
+                }
+            },
+        };
+        match same.and_then(|at| kept.get_mut(at)) {
+            Some((_, repeats, last)) => {
+                *repeats += 1;
+                *last = diagnostic.message;
+            }
+            None => kept.push((diagnostic, 0, String::new())),
+        }
+    }
+    for (diagnostic, repeats, last) in kept {
+        diagnostics.push(match repeats {
+            0 => diagnostic,
+            // The very same is said once.
+            _ if last == diagnostic.message => diagnostic,
+            1 => diagnostic.because(format!("and once more: {last}")),
+            n => diagnostic.because(format!("and {n} times more, the last: {last}")),
+        });
     }
 }
 

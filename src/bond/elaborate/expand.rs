@@ -284,8 +284,11 @@ impl<'a> Scope<'a> {
         .says("not one of its parameters or inputs")
         .label(body.span, "the model");
         if let Some(Meaning::Parameter(id)) = self.value(name) {
-            return error
-                .label(self.graph.parameters[id.index()].span, "a private parameter")
+            let declared = self.graph.parameters[id.index()].span;
+            let message = format!("`{name}` is a private parameter of the model `{}`", body.name);
+            return Diagnostic::error("E0234", span, message)
+                .says("not the instance's to give")
+                .label(declared, "declared here")
                 .help("parameters that instances may set stand in the brackets after the model's name");
         }
         let frame = self.frame();

@@ -200,7 +200,7 @@ impl Scope<'_> {
     /// The value of an element without arguments: the parameter or signal of its name.
     fn implied(&mut self, declaration: &Declaration<'_>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = declaration.name.span;
-        let key = self.key(&declaration.name)?;
+        let key = self.key(declaration.name)?;
         let name = &*key;
         let leaf = match self.value(name) {
             Some(Meaning::Parameter(id)) => Leaf::Parameter(id),

@@ -17,6 +17,7 @@ mod call;
 mod dynamics;
 mod tables;
 mod signals;
+mod regulators;
 mod laws;
 mod dimensions;
 mod domains;
@@ -33,7 +34,7 @@ pub use program::{Program, load};
 
 use super::graph::BondGraph;
 use super::syntax;
-use crate::diagnostic::{Diagnostic, has_errors};
+use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::source::{SourceMap, Span};
 
 /// What the command line says instead of the file.
@@ -63,11 +64,12 @@ pub fn elaborate(
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<BondGraph> {
+    let before = d.len();
     let mut set = vec![];
     for (name, text) in &overrides.set {
-        let before = d.len();
+        let known = d.len();
         let value = syntax::parse_value(text, Span::NONE.file, d);
-        for error in &mut d[before..] {
+        for error in &mut d[known..] {
             error.notes.push(format!("in the value that was set: {name}={text}"));
         }
         set.push((name.clone(), text.clone(), value));
@@ -79,5 +81,6 @@ pub fn elaborate(
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
     scope.set_experiment(overrides, d);
+    merge_repeats(d, before);
     (!has_errors(d)).then_some(scope.graph)
 }

@@ -24,6 +24,7 @@ impl Scope<'_> {
         self.check_outputs(d);
         self.infer_signal_dimensions();
         self.find_loops(d);
+        self.make_regulators(d);
         self.sort_signals();
     }
 
@@ -304,6 +305,11 @@ impl Scope<'_> {
                 Tree::new(Node::Leaf(leaf), span)
             });
         };
+        for regulator in &mut graph.regulators {
+            regulator.signal = place[regulator.signal.index()];
+            renumber(&mut regulator.controlled);
+            renumber(&mut regulator.reference);
+        }
         for signal in &mut graph.signals {
             match &mut signal.law {
                 SignalLaw::Algebraic(expr) => renumber(expr),

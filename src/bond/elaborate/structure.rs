@@ -145,7 +145,12 @@ impl<'a> Scope<'a> {
     }
 
     /// The arrows of a chain.
-    fn draw(&mut self, chain: &Chain, incomplete: &mut HashSet<VertexId>, d: &mut Vec<Diagnostic>) {
+    fn draw(
+        &mut self,
+        chain: &'a Chain,
+        incomplete: &mut HashSet<VertexId>,
+        d: &mut Vec<Diagnostic>,
+    ) {
         let mut last: Option<&ChainEnd> = chain.first.last();
         // What an end means is found out once, though it stands behind one arrow and before the next.
         let mut found = last.and_then(|end| self.tip_of(end, d));
@@ -156,9 +161,14 @@ impl<'a> Scope<'a> {
                 last = Some(end);
                 found = self.tip_of(end, d);
                 let to = found.and_then(|found| self.tip(end, &found, true, d));
-                if let (Some((first, _)), Some(from), Some(to)) = (before, from, to) {
-                    self.add_half((first, from), (end, to), arrow, d);
+                if let (Some((first, _)), Some(from), Some(to)) = (before, from, to)
+                    && self.add_half((first, from), (end, to), arrow, d)
+                {
                     continue;
+                }
+                if found.is_none() {
+                    // Whatever it means, its bond is not missing.
+                    self.frame_mut().excused.insert(&end.path.name.text);
                 }
                 // The wrong end has been reported: do not count the bonds of either.
                 for found in [before.map(|(_, found)| found), found].into_iter().flatten() {
@@ -300,13 +310,14 @@ impl<'a> Scope<'a> {
         None
     }
 
+    /// Takes in an arrow; an error has been reported where it cannot be.
     fn add_half(
         &mut self,
         from: (&ChainEnd, Tip),
         to: (&ChainEnd, Tip),
         arrow: &Arrow,
         d: &mut Vec<Diagnostic>,
-    ) {
+    ) -> bool {
         // Of several ends in a list each has its own place: only the first stands right behind the arrow.
         let whole = to.0.span;
         let behind = self.map.text(Span { start: arrow.span.end, end: whole.start, ..whole });
@@ -328,11 +339,12 @@ impl<'a> Scope<'a> {
                 .label(self.halves[first].span, "first joined here")
                 .label(port.span, "the port");
                 d.push(error.help("put a junction at the port, and join both to it"));
-                return;
+                return false;
             }
             *slot = Some(index);
         }
         self.halves.push(Half { from: from.1, to: to.1, stroke: arrow.stroke, span, bond: None });
+        true
     }
 
     /// The bonds: each from a vertex through any number of ports to a vertex.

@@ -204,12 +204,14 @@ impl Lexer<'_> {
 
     /// Whether a word that comes next is a unit: after a number and at most one blank, or after `in`.
     fn takes_unit(&self) -> bool {
-        let one_blank = match self.tokens.last() {
-            Some(token) if token.kind == Kind::Blank => token.end - token.start == 1,
-            Some(token) => token.kind != Kind::LineEnd,
-            None => false,
+        let number = match self.tokens.as_slice() {
+            [.., number, blank] if blank.kind == Kind::Blank => {
+                number.kind == Kind::Number && blank.end - blank.start == 1
+            }
+            [.., number] => number.kind == Kind::Number,
+            [] => false,
         };
-        let number = self.last == Kind::Number && one_blank && !self.after_member();
+        let number = number && !self.after_member();
         number || self.wants_unit
     }
 
