@@ -16,7 +16,13 @@ pub mod verify;
 pub mod compare;
 pub mod causality;
 pub mod trace;
+pub mod examples;
+pub mod completions;
+pub mod man;
 
+use crate::diagnostic::Diagnostic;
+use crate::quantity::nearest;
+use crate::source::Span;
 use clap::{Args, FromArgMatches};
 use session::{Exit, Global, Session};
 use std::process::ExitCode;
@@ -59,6 +65,9 @@ pub const COMMANDS: &[Command] = &[
     command!(compare),
     command!(causality),
     command!(trace),
+    command!(examples),
+    command!(completions),
+    command!(man),
 ];
 
 /// The whole command line, as clap knows it.
@@ -75,6 +84,15 @@ pub fn describe() -> clap::Command {
     COMMANDS.iter().fold(program, |program, row| {
         program.subcommand((row.describe)(clap::Command::new(row.name)))
     })
+}
+
+/// The error for a command that is not there; it tells the nearest.
+fn unknown_command(name: &str) -> Diagnostic {
+    let error = Diagnostic::error("E0940", Span::NONE, format!("no command is called `{name}`"));
+    match nearest(name, COMMANDS.iter().map(|row| row.name)) {
+        Some(meant) => error.help(format!("did you mean `{meant}`?")),
+        None => error.help("`bondspice --help` lists them"),
+    }
 }
 
 /// Runs the command line of this process and returns its exit code.

@@ -3,6 +3,7 @@
 //! A [`Span`] travels from the text that a user wrote to the last equation of the solver, so that every failure can
 //! point at a line.
 
+pub mod examples;
 pub mod library;
 pub mod loader;
 
