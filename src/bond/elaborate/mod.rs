@@ -31,6 +31,7 @@ pub use expand::MOST_PARTS;
 pub use experiment::require_drives;
 pub use observe::observables;
 pub use program::{Program, load};
+pub use reading::READINGS;
 
 use super::graph::BondGraph;
 use super::syntax;

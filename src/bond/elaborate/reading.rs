@@ -10,7 +10,7 @@ use crate::expr::{Binary, Expr as Tree, Node};
 use crate::source::Span;
 
 /// The names of readings.
-pub(super) const READINGS: [&str; 5] = ["e", "f", "q", "p", "power"];
+pub const READINGS: [&str; 5] = ["e", "f", "q", "p", "power"];
 
 impl Scope<'_> {
     /// What a reading means.
