@@ -30,6 +30,7 @@ struct Said {
     diagnostics: Vec<Value>,
     /// What is no diagnostic.
     other: String,
+    stdout: String,
 }
 
 /// Every file of the gallery with what the program says, in the order of their names.
@@ -94,6 +95,7 @@ fn run(name: &str, bytes: Option<&[u8]>, command: &[String], form: &[&str]) -> S
         exit: output.status.code().unwrap_or(-1),
         diagnostics: vec![],
         other: String::new(),
+        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
     };
     for line in text.lines() {
         match serde_json::from_str::<Value>(line) {
@@ -438,4 +440,93 @@ fn what_is_right_runs() {
         missing.is_empty(),
         "no bad file of {missing:?} shows what would be right: add a line `#= …` below the wrong one"
     );
+}
+
+/// Whether a file's notes say what would be right, or every error of it carries a fix.
+fn says_what_is_right(bad: &Bad) -> bool {
+    let wanted =
+        |d: &&Value| d["severity"] == "error" || errors(&bad.said.diagnostics).count() == 0;
+    bad.example.right.is_some()
+        || bad.example.right_command.is_some()
+        || bad.said.diagnostics.iter().filter(wanted).all(|d| d["fix"].is_object())
+}
+
+#[test]
+fn every_code_has_its_example_in_the_program() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnostic/examples.rs");
+    let mut rows = String::new();
+    for row in CODES {
+        let notes = |bad: &Bad| {
+            let plain = folder().join(&bad.name).is_file()
+                && !folder().join(format!("{}.expected", bad.name)).is_file();
+            if plain { bad.name.clone() } else { format!("{}.expected", bad.name) }
+        };
+        let shows = |bad: &&Bad| {
+            bad.said.diagnostics.iter().any(|d| text(d, "code") == row.code)
+                && says_what_is_right(bad)
+        };
+        let written = bondspice::diagnostic::examples::find(row.code).map(|(name, _)| name);
+        let stays = gallery().iter().filter(shows).find(|bad| Some(notes(bad).as_str()) == written);
+        // Of those that say nothing else the smallest.
+        let others = |bad: &&Bad| {
+            let other = bad.said.diagnostics.iter().filter(|d| text(d, "code") != row.code).count();
+            (other, bad.example.plain.len() + 10 * bad.example.command.len(), bad.name.clone())
+        };
+        if let Some(bad) = stays.or_else(|| gallery().iter().filter(shows).min_by_key(others)) {
+            rows += &format!("    \"{}\" \"{}\"\n", row.code, notes(bad));
+        }
+    }
+    let mut beside = String::new();
+    for name in text_files_beside() {
+        let read = |bad: &Bad| {
+            rows.contains(&format!(" \"{}\"\n", bad.name)) && bad.example.plain.contains(&name)
+        };
+        if gallery().iter().any(read) {
+            beside += &format!("    \"{name}\"\n");
+        }
+    }
+    let source = std::fs::read_to_string(&path).unwrap();
+    let table = |source: &str, start: &str, rows: &str| -> String {
+        let (head, rest) = source.split_once(start).unwrap();
+        let (_, tail) = rest.split_once("};").unwrap();
+        let rows = if rows.is_empty() { String::new() } else { format!("\n{rows}") };
+        format!("{head}{start}{rows}}};{tail}")
+    };
+    let wanted = table(&source, "= examples! {", &rows);
+    let wanted = table(&wanted, "= beside! {", &beside);
+    if std::env::var_os("GALLERY").is_some_and(|value| value == "write") {
+        std::fs::write(&path, wanted).unwrap();
+        return;
+    }
+    assert_eq!(
+        source, wanted,
+        "the examples of `bondspice explain` do not fit the files of the gallery.\n\
+         Run `GALLERY=write cargo test --test gallery`; it writes src/diagnostic/examples.rs."
+    );
+}
+
+/// The names of the texts in `with/`, as files call them.
+fn text_files_beside() -> Vec<String> {
+    let entries = std::fs::read_dir(folder().join("with")).unwrap().map(|entry| entry.unwrap());
+    let texts = entries.filter(|entry| std::fs::read_to_string(entry.path()).is_ok());
+    let mut names: Vec<String> =
+        texts.map(|entry| format!("with/{}", entry.file_name().to_string_lossy())).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn every_code_is_explained() {
+    for row in CODES {
+        let said = run("", None, &["explain".into(), row.code.to_lowercase()], &["json"]);
+        assert_eq!((said.exit, said.other.as_str()), (0, ""), "{}", row.code);
+        let stdout = said.stdout;
+        assert!(stdout.contains(&format!("[{}]: {}", row.code, row.title)), "{stdout}");
+        if bondspice::diagnostic::examples::find(row.code).is_some() {
+            assert!(stdout.contains("\nWrong, as `bondspice "), "{stdout}");
+            assert!(stdout.contains("\nRight"), "{stdout}");
+            assert!(stdout.matches(row.code).count() > 1, "the example shows no {stdout}");
+        }
+        assert!(!stdout.contains("#~") && !stdout.contains("*~"), "{stdout}");
+    }
 }

@@ -19,6 +19,7 @@ pub mod trace;
 pub mod examples;
 pub mod completions;
 pub mod man;
+pub mod explain;
 
 use crate::diagnostic::Diagnostic;
 use crate::quantity::nearest;
@@ -68,6 +69,7 @@ pub const COMMANDS: &[Command] = &[
     command!(examples),
     command!(completions),
     command!(man),
+    command!(explain),
 ];
 
 /// The whole command line, as clap knows it.
@@ -113,7 +115,7 @@ pub fn main() -> ExitCode {
 pub fn run(arguments: Vec<std::ffi::OsString>) -> Exit {
     let matches = match describe().try_get_matches_from(arguments) {
         Ok(matches) => matches,
-        Err(error) => return explain(&error),
+        Err(error) => return tell(&error),
     };
     let global = Global::from_arg_matches(&matches).unwrap_or_default();
     let mut session = Session::new(global);
@@ -124,12 +126,12 @@ pub fn run(arguments: Vec<std::ffi::OsString>) -> Exit {
             session.close();
             exit
         }
-        Err(error) => explain(&error),
+        Err(error) => tell(&error),
     }
 }
 
 /// Prints clap's message: help and version on stdout, errors on stderr.
-fn explain(error: &clap::Error) -> Exit {
+fn tell(error: &clap::Error) -> Exit {
     // Where nobody reads it, nobody misses it.
     let _ = error.print();
     if error.use_stderr() { Exit::Usage } else { Exit::Fine }

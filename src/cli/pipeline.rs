@@ -125,6 +125,24 @@ pub fn causality(graph: &BondGraph, d: &mut Vec<Diagnostic>) -> Option<Causality
     causality
 }
 
+/// All that can be said about a text without running it.
+pub fn check(map: &mut SourceMap, file: FileId, overrides: &Overrides, d: &mut Vec<Diagnostic>) {
+    match language(map, file) {
+        Language::Bond => {
+            if let Some(graph) = graph(map, file, overrides, d) {
+                causality(&graph, d);
+            }
+        }
+        Language::Netlist => {
+            let circuit = circuit(map, file, overrides, d);
+            let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, d));
+            if let Some(stamps) = stamps {
+                sim::compile(&stamps, d);
+            }
+        }
+    }
+}
+
 /// A bond graph with all that is known before it runs.
 pub struct Model {
     /// The graph.

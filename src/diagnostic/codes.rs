@@ -208,10 +208,33 @@ pub const CODES: &[Code] = &[
     row("E0944", "flag that does not fit the input", "Netlists have parameters and columns but no inputs, graph or causality; bond graphs have all of them."),
     row("E0945", "two columns of one name", "The headers of a result must differ. Give one of the columns another name with `as`."),
     row("E0948", "no such example", "`bondspice examples` lists the models that come with the program; a name stands with its folder, as in `textbook/A1`."),
+    row("E0949", "no such code", "`bondspice explain` without a code lists all of them."),
     row("W0931", "result lacks variables of the map", "Some variables of the map need circuit variables that the simulator did not keep; they are left out. `.save all` keeps everything."),
     row("N0946", "one of several analyses is run", "A netlist asks for several analyses and the last is run. Pick another with --analysis."),
     row("N0947", "output interval chosen", "The file says how long to simulate and not how often to write a row: a thousand rows are written."),
 ];
+
+/// Stages: the first and the last number of its codes, what it is about, and the exit code of its errors.
+#[rustfmt::skip]
+pub const STAGES: &[(u32, u32, &str, u8)] = &[
+    (100, 199, "characters and syntax", 3),
+    (200, 299, "names and language", 3),
+    (300, 399, "units and domains", 3),
+    (400, 499, "structure of the graph, causality", 3),
+    (500, 599, "initial values, the graph's equations", 3),
+    (600, 699, "translation", 3),
+    (700, 799, "netlists and circuits", 3),
+    (800, 899, "simulation", 4),
+    (900, 919, "files", 5),
+    (920, 939, "data files", 3),
+    (940, 999, "usage", 2),
+];
+
+/// What the stage of a code is about.
+pub fn stage(code: &str) -> Option<&'static str> {
+    let number: u32 = code.get(1..)?.parse().ok()?;
+    STAGES.iter().find(|row| (row.0..=row.1).contains(&number)).map(|row| row.2)
+}
 
 /// The row of a code.
 pub fn find(code: &str) -> Option<&'static Code> {
@@ -232,6 +255,7 @@ mod tests {
         for row in CODES {
             assert!(row.code.len() == 5 && "EWN".contains(&row.code[..1]), "{}", row.code);
             assert!(row.code[1..].bytes().all(|b| b.is_ascii_digit()), "{}", row.code);
+            assert!(stage(row.code).is_some(), "{} has no stage", row.code);
             assert!(!row.title.is_empty() && row.explanation.ends_with('.'), "{}", row.code);
         }
         for pair in CODES.windows(2) {

@@ -27,6 +27,8 @@ pub struct Expected {
     pub code: String,
     /// The line of its first label, from 1; `None` when it points at no text.
     pub line: Option<usize>,
+    /// That line in the text without the notes.
+    pub plain_line: Option<usize>,
     /// Part of its message.
     pub message: String,
     /// What else must be said.
@@ -161,7 +163,9 @@ fn expected(note: &str, lines: &[usize], here: usize) -> Result<Expected, String
     if message.trim().is_empty() {
         return Err(format!("part of the message is missing after {code}"));
     }
-    Ok(Expected { code: code.into(), line, message: message.trim().into(), more: vec![] })
+    let plain_line = line.and_then(|line| lines.iter().position(|at| *at == line)).map(|at| at + 1);
+    let (code, message) = (code.to_string(), message.trim().to_string());
+    Ok(Expected { code, line, plain_line, message, more: vec![] })
 }
 
 /// `help: text`

@@ -3,7 +3,9 @@
 //! Nothing is thrown: each stage pushes onto a `Vec<Diagnostic>` and goes on as far as it can.
 
 pub mod codes;
+pub mod examples;
 pub mod files;
+pub mod fix;
 pub mod gallery;
 pub mod render;
 
