@@ -1,7 +1,8 @@
 //! The bad file that explains each code, one a line, in the order of the codes.
 //!
 //! Written by `GALLERY=write cargo test --test gallery`: the smallest file of the gallery that shows the code and what
-//! would be right. A line that does so stays as it is, so another file may be put here by hand.
+//! would be right. A line that does so stays as it is, so another file may be put here by hand; a line whose file is
+//! gone is deleted by hand first.
 
 macro_rules! examples {
     ($($code:literal $file:literal)*) => {
@@ -52,6 +53,19 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0225" "memory_observed.bg"
     "E0226" "end_not_positive.bg"
     "E0227" "input_not_driven.bg"
+    "E0230" "import_missing.bg"
+    "E0231" "import_circle.bg"
+    "E0232" "index_not_whole.bg"
+    "E0233" "model_named_like_a_kind.bg"
+    "E0234" "instance_argument_without_name.bg"
+    "E0235" "instance_without_parameter.bg"
+    "E0236" "statement_within_braces.bg"
+    "E0237" "too_many_terms.bg"
+    "E0238" "loop_without_index.bg"
+    "E0239" "model_in_itself.bg"
+    "E0240" "unknown_domain.bg"
+    "E0241" "private_signal.bg"
+    "E0242" "no_regulator.bg"
     "E0250" "time_constant_of_0.bg"
     "E0251" "table_falls.bg"
     "E0252" "table_file_torn.bg"
@@ -69,6 +83,12 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0408" "loop_of_signals.bg"
     "E0409" "port_taken_twice.bg"
     "E0410" "n4_unknown_port.bg"
+    "E0411" "port_without_bond_inside.bg"
+    "E0412" "which_port.bg"
+    "E0413" "not_a_port.bg"
+    "E0414" "against_the_port.bg"
+    "E0415" "two_bonds_at_a_port.bg"
+    "E0416" "two_strokes.bg"
     "W0401" "inertias_on_a_gear.bg"
     "W0402" "resistor_and_signal.bg"
     "W0403" "modulus_divides.bg"
@@ -122,12 +142,13 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0806" "no_end.bg"
     "E0807" "option_value.bg"
     "W0801" "unknown_option.bg"
-    "W0802" "condition_in_a_law.cir"
+    "W0803" "sliding.bg"
     "E0901" "no_such_file.expected"
     "E0902" "unreadable.expected"
     "E0903" "folder.expected"
     "E0905" "unwritable.expected"
     "E0906" "over_an_input.expected"
+    "E0907" "rlc.bg"
     "E0920" "not_a_trace.expected"
     "E0921" "words_in_a_table.expected"
     "E0922" "raw_cut_off.expected"
@@ -143,7 +164,8 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0942" "nothing_to_compare.expected"
     "E0943" "other_dialect.expected"
     "E0944" "netlist_verified.expected"
-    "E0948" "no_such_code.expected"
+    "E0948" "no_such_example.expected"
+    "E0949" "no_such_code.expected"
     "W0931" "map_in_part.expected"
     "N0946" "last_analysis.cir"
     "N0947" "step_chosen.bg"
