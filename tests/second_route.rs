@@ -1,9 +1,8 @@
 //! The second route on the shipped models, against references made elsewhere and closed forms.
 
 use bondspice::bond::causality::Causality;
-use bondspice::bond::elaborate::{Overrides, elaborate};
+use bondspice::bond::elaborate::{Overrides, elaborate, load};
 use bondspice::bond::graph::BondGraph;
-use bondspice::bond::syntax::parse;
 use bondspice::second::{Run, Settings, integrate};
 use bondspice::source::SourceMap;
 use bondspice::trace::{Trace, csv};
@@ -19,8 +18,8 @@ fn graph(model: &str, overrides: &Overrides) -> BondGraph {
     let mut map = SourceMap::default();
     let id = map.add(model, file(&format!("models/{model}.bg")));
     let mut d = vec![];
-    let text = parse(&map, id, &mut d);
-    match elaborate(&text.into(), &map, overrides, &mut d) {
+    let program = load(&mut map, id, &overrides.folders, &mut d);
+    match elaborate(&program, &map, overrides, &mut d) {
         Some(graph) => graph,
         None => panic!("{model}: {d:#?}"),
     }

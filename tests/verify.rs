@@ -1,10 +1,9 @@
 //! `verify` on the shipped models, and on translations that were made wrong.
 
 use bondspice::bond::causality::{Causality, assign};
-use bondspice::bond::elaborate::{Overrides, elaborate};
+use bondspice::bond::elaborate::{Overrides, elaborate, load};
 use bondspice::bond::graph::BondGraph;
 use bondspice::bond::initial;
-use bondspice::bond::syntax::parse;
 use bondspice::diagnostic::Diagnostic;
 use bondspice::expr::{Expr, Node};
 use bondspice::netlist::{CardKind, Element, Netlist};
@@ -20,8 +19,8 @@ fn translated(model: &str) -> (BondGraph, Causality, Netlist) {
     let mut map = SourceMap::default();
     let file = map.add(model, std::fs::read_to_string(path).unwrap());
     let mut d: Vec<Diagnostic> = vec![];
-    let syntax = parse(&map, file, &mut d);
-    let result = elaborate(&syntax.into(), &map, &Overrides::default(), &mut d).and_then(|graph| {
+    let program = load(&mut map, file, &[], &mut d);
+    let result = elaborate(&program, &map, &Overrides::default(), &mut d).and_then(|graph| {
         let causality = assign(&graph, &mut d)?;
         let initial = initial::solve(&graph, &causality, &mut d)?;
         let translation = translate(&graph, &causality, &initial, &map, &mut d)?;

@@ -3,7 +3,7 @@
 use bondspice::bond::causality::{self, Causality};
 use bondspice::bond::elaborate::{self, Overrides};
 use bondspice::bond::graph::BondGraph;
-use bondspice::bond::{initial, syntax};
+use bondspice::bond::initial;
 use bondspice::netlist::write::write;
 use bondspice::source::SourceMap;
 use bondspice::translate::{Translation, translate};
@@ -38,7 +38,10 @@ pub fn models() -> Vec<PathBuf> {
         for entry in std::fs::read_dir(&path).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
-                waiting.push(path);
+                // The library's files hold models for others to use, and run nothing themselves.
+                if path.file_name().is_none_or(|name| name != "std") {
+                    waiting.push(path);
+                }
             } else if path.extension().is_some_and(|ending| ending == "bg") {
                 found.push(path.strip_prefix(&folder).unwrap().to_path_buf());
             }
@@ -56,8 +59,8 @@ pub fn translated(model: &Path, overrides: &Overrides) -> Translated {
     let file =
         map.add(format!("models/{}", model.display()), std::fs::read_to_string(path).unwrap());
     let mut d = vec![];
-    let parsed = syntax::parse(&map, file, &mut d);
-    let graph = elaborate::elaborate(&parsed.into(), &map, overrides, &mut d);
+    let program = elaborate::load(&mut map, file, &overrides.folders, &mut d);
+    let graph = elaborate::elaborate(&program, &map, overrides, &mut d);
     let graph = graph.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
     let causality = causality::assign(&graph, &mut d);
     let causality = causality.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));

@@ -9,18 +9,15 @@ use crate::source::Span;
 
 /// Warns of nodes that are named once in a scope, terminals, readings and outputs taken together.
 pub fn check(netlist: &Netlist, header: &Header, d: &mut Vec<Diagnostic>) {
+    if !header.columns.is_empty() {
+        // It comes from a bond graph, where a signal that nothing reads is no slip: an output of a model, say.
+        return;
+    }
     let mut usage =
         Usage { found: 0, scope: 0, last: 0, counts: vec![(0, 0); netlist.names.len()] };
-    // Columns and domains of the header name nodes too; what they name is meant.
-    let mut meant = vec![];
-    for name in header.domains.iter().flat_map(|domain| &domain.nodes) {
-        meant.extend(netlist.names.find(name));
-    }
-    for column in &header.columns {
-        let words =
-            column.expr.split(|c: char| !(c.is_alphanumeric() || matches!(c, '_' | '.' | '#')));
-        meant.extend(words.filter_map(|word| netlist.names.find(word)));
-    }
+    // Domains of the header name nodes too; what they name is meant.
+    let nodes = header.domains.iter().flat_map(|domain| &domain.nodes);
+    let meant: Vec<Name> = nodes.filter_map(|name| netlist.names.find(name)).collect();
     usage.scope(netlist, &netlist.cards, &meant, d);
     if usage.found > MOST {
         let message = format!("{} more nodes are named only once", usage.found - MOST);
