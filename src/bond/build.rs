@@ -145,7 +145,7 @@ impl Build {
     /// Observes q or p.
     pub fn observe_stored(&mut self, id: VertexId) {
         let name = self.graph.vertex(id).name.clone();
-        self.observe(&name, Expr::leaf(Leaf::Stored(id)));
+        self.observe(&name, Expr::leaf(Leaf::Stored(End::only(id))));
     }
 
     /// Observes a bond's variable.

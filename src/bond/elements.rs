@@ -23,6 +23,8 @@ pub enum Shape {
     Compliance,
     /// Stores p = ∫e dt.
     Inertia,
+    /// Several ports, some of which store q and some p.
+    Mixed,
     /// e1 = r·e2.
     Transformer,
     /// e1 = r·f2.
@@ -58,6 +60,8 @@ pub const ELEMENTS: &[Element] = &[
     row("MC", Shape::Compliance, "compliance"),
     row("I", Shape::Inertia, "inertia"),
     row("MI", Shape::Inertia, "inertia"),
+    row("IC", Shape::Mixed, "IC field"),
+    row("MIC", Shape::Mixed, "IC field"),
     row("TF", Shape::Transformer, "transformer"),
     row("MTF", Shape::Transformer, "transformer"),
     row("GY", Shape::Gyrator, "gyrator"),

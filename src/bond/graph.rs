@@ -53,8 +53,8 @@ pub enum Leaf {
     /// A bond's variable, counted along the half arrow, or negated.
     #[allow(missing_docs)]
     Bond { bond: BondId, variable: Power, negated: bool },
-    /// q of a compliance or p of an inertia.
-    Stored(VertexId),
+    /// q of a compliance or p of an inertia, at its port.
+    Stored(End),
 }
 
 /// The two power variables.
@@ -181,7 +181,7 @@ pub struct Vertex {
     pub law: Law,
     /// Where it is declared.
     pub span: Span,
-    /// Its bonds: one for a one-port, [port 1, port 2] for a two-port, in file order for a junction.
+    /// Its bonds: one for a one-port, one a port in their order for two-ports and fields, in file order for a junction.
     pub bonds: Vec<BondId>,
 }
 
@@ -207,6 +207,19 @@ pub enum Law {
     Transformer(Modulus),
     /// Ratio r: e1 = r·f2, e2 = r·f1. Gain g: f1 = g·e2, f2 = g·e1.
     Gyrator(Modulus),
+    /// Several ports whose laws speak of each other.
+    Field(Field),
+}
+
+/// A multiport C, I, IC or R: every port has the law of a dissipator or a storage, over the variables of all ports. f of
+/// each port is counted into the element. [`fields`](super::fields) holds the theory.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// By port: a [`Law::Dissipator`] or a [`Law::Store`] (not the linear ones), in which the own variables of all ports
+    /// are [`Leaf::Bond`] and [`Leaf::Stored`].
+    pub ports: Vec<Law>,
+    /// Its matrix by rows, when it was given as one: e = R·f, q = C·e, p = I·f.
+    pub matrix: Option<Vec<Vec<Expr>>>,
 }
 
 /// Laws of dissipators.
@@ -275,13 +288,20 @@ pub enum Modulus {
     Gain(Expr),
 }
 
-/// An end of a bond.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// An end of a bond: a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct End {
     /// The junction or element.
     pub vertex: VertexId,
-    /// 0 for one-ports and junctions; 0 or 1 for two-ports.
+    /// 0 for one-ports and junctions; 0 or 1 for two-ports; the port's number less one for fields.
     pub port: u32,
+}
+
+impl End {
+    /// The only port of a one-port.
+    pub fn only(vertex: VertexId) -> End {
+        End { vertex, port: 0 }
+    }
 }
 
 /// A bond with its half arrow from `from` to `to`.
@@ -403,6 +423,108 @@ impl BondGraph {
     /// `from -> to` in the words of the file.
     pub fn bond_name(&self, id: BondId) -> String {
         let bond = self.bond(id);
-        format!("{} -> {}", self.vertex(bond.from.vertex).name, self.vertex(bond.to.vertex).name)
+        format!("{} -> {}", self.end_name(bond.from), self.end_name(bond.to))
+    }
+
+    /// The name of a bond's end, a field's with its port, since no direction tells its ports apart.
+    pub fn end_name(&self, end: End) -> String {
+        match self.vertex(end.vertex).law {
+            Law::Field(_) => self.port_name(end),
+            _ => self.vertex(end.vertex).name.clone(),
+        }
+    }
+
+    /// The law that holds at a port: a field's own one there, else the element's.
+    pub fn law_at(&self, end: End) -> &Law {
+        let law = &self.vertex(end.vertex).law;
+        match law {
+            Law::Field(field) => field.ports.get(end.port as usize).unwrap_or(law),
+            _ => law,
+        }
+    }
+
+    /// The ports of an element that have a law of their own: all of a field's, else port 0.
+    pub fn law_ports(&self, vertex: VertexId) -> impl Iterator<Item = End> + use<> {
+        let count = match &self.vertex(vertex).law {
+            Law::Field(field) => field.ports.len(),
+            _ => 1,
+        };
+        (0..count as u32).map(move |port| End { vertex, port })
+    }
+
+    /// The ports that store, in the order of the file.
+    pub fn stores(&self) -> impl Iterator<Item = (End, Storage)> + '_ {
+        let ends = self.vertex_ids().flat_map(|id| self.law_ports(id));
+        ends.filter_map(|end| Some((end, self.storage(end)?)))
+    }
+
+    /// What a port stores, if anything.
+    pub fn storage(&self, end: End) -> Option<Storage> {
+        match self.law_at(end) {
+            Law::Store { kind, .. } | Law::Rate { kind, .. } => Some(*kind),
+            _ => None,
+        }
+    }
+
+    /// The bond of a port that is not a junction's.
+    pub fn bond_at(&self, end: End) -> Option<BondId> {
+        self.vertex(end.vertex).bonds.get(end.port as usize).copied()
+    }
+
+    /// The name of a port as the file would write it: that of two-ports and fields with its number.
+    pub fn port_name(&self, end: End) -> String {
+        let vertex = self.vertex(end.vertex);
+        match vertex.law {
+            Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_) => {
+                format!("{}.{}", vertex.name, end.port + 1)
+            }
+            _ => vertex.name.clone(),
+        }
+    }
+}
+
+impl Law {
+    /// Calls `visit` for every expression that holds during a run.
+    pub fn expressions<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
+        match self {
+            Law::Zero | Law::One => {}
+            Law::Source { value, .. } => visit(value),
+            Law::Dissipator(
+                Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
+            ) => visit(law),
+            Law::Store { law, .. } => match law {
+                StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
+                    visit(law)
+                }
+            },
+            Law::Rate { rate, .. } => visit(rate),
+            Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
+                Modulus::Ratio(value) | Modulus::Gain(value) => visit(value),
+            },
+            Law::Field(field) => field.ports.iter().for_each(|law| law.expressions(visit)),
+        }
+    }
+    /// The same, to change them; a field's matrix too.
+    pub fn expressions_mut(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        match self {
+            Law::Zero | Law::One => {}
+            Law::Source { value, .. } => visit(value),
+            Law::Dissipator(
+                Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
+            ) => visit(law),
+            Law::Store { law, .. } => match law {
+                StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
+                    visit(law)
+                }
+            },
+            Law::Rate { rate, .. } => visit(rate),
+            Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
+                Modulus::Ratio(value) | Modulus::Gain(value) => visit(value),
+            },
+            Law::Field(field) => {
+                field.ports.iter_mut().for_each(|law| law.expressions_mut(visit));
+                field.matrix.iter_mut().flatten().flatten().for_each(visit);
+            }
+        }
     }
 }

@@ -9,8 +9,8 @@ use super::consistent::{self, Slot};
 use super::equations::compiled::Readings;
 use super::equations::{Equations, Formula, Input, Unknown, unknown_name};
 use super::graph::{
-    BondGraph, Expr, Initial, Law, Leaf, Power, SignalId, SignalLaw, Storage, StoreInitial,
-    StoreLaw, VertexId,
+    BondGraph, BondId, End, Expr, Initial, Law, Leaf, Power, SignalId, SignalLaw, Storage,
+    StoreInitial, StoreLaw,
 };
 use super::prepared::{Prepared, elements, explain, named, prepare, spans};
 use super::roots::roots;
@@ -21,14 +21,21 @@ use crate::source::Span;
 /// Values at t = 0+, all in SI.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InitialState {
-    /// By vertex: its storage at the start; `None` for what stores nothing.
-    pub storages: Vec<Option<StorageValue>>,
+    /// By vertex: what its ports store at the start; nothing for what does not store.
+    pub storages: Vec<Vec<StorageValue>>,
     /// By signal: its value; for an integrator the value that it starts from.
     pub signals: Vec<f64>,
     /// By bond: its effort.
     pub efforts: Vec<f64>,
     /// By bond: its flow, along the half arrow.
     pub flows: Vec<f64>,
+}
+
+impl InitialState {
+    /// What a port stores at the start.
+    pub fn storage(&self, end: End) -> Option<StorageValue> {
+        self.storages.get(end.vertex.index())?.get(end.port as usize).copied()
+    }
 }
 
 /// A storage at the start.
@@ -50,23 +57,17 @@ pub fn solve(
     let y = start(graph, &mut prepared, d)?;
     let equations = &prepared.equations;
     let inside = first_segment(graph, equations) * 0.5;
-    let storages = graph
-        .vertex_ids()
-        .map(|id| {
-            let (kind, bond) = match &graph.vertex(id).law {
-                Law::Store { kind, .. } | Law::Rate { kind, .. } => {
-                    (kind, graph.vertex(id).bonds.first()?)
-                }
-                _ => return None,
-            };
-            let sign =
-                if kind.gives() == Power::Flow { graph.sign_into(*bond, id, 0) } else { 1.0 };
-            Some(StorageValue {
-                stored: equations.stored(id).map_or(0.0, |k| y[k]),
-                power: sign * y[equations.power(*bond, kind.gives())],
-            })
+    let storage = |end: End| {
+        let (kind, bond) = (graph.storage(end)?, graph.bond_at(end)?);
+        let (column, sign) = own(graph, equations, end, bond, kind.gives());
+        Some(StorageValue {
+            stored: equations.stored(end).map_or(0.0, |k| y[k]),
+            // Not −0.
+            power: sign * y[column] + 0.0,
         })
-        .collect();
+    };
+    let storages =
+        graph.vertex_ids().map(|id| graph.law_ports(id).filter_map(storage).collect()).collect();
     let signals = (0..graph.signals.len() as u32)
         .map(|i| match equations.signal(SignalId(i)) {
             Some(Input::Unknown(k)) => y[k as usize],
@@ -183,8 +184,9 @@ fn say(
             },
             _ => Said::Value { value: 0.0, stated: false },
         },
-        Unknown::Stored(id) => match &graph.vertex(id).law {
-            Law::Store { kind, law, initial } => {
+        Unknown::Stored(end) => match (graph.law_at(end), graph.bond_at(end)) {
+            (Law::Store { kind, law, initial }, Some(bond)) => {
+                let (column, sign) = own(graph, equations, end, bond, kind.gives());
                 let said = match initial {
                     StoreInitial::Unstated => Said::Value { value: 0.0, stated: false },
                     StoreInitial::Stored(expr) => Said::Value { value: number(expr), stated: true },
@@ -192,12 +194,9 @@ fn say(
                         let value = number(expr);
                         match stored_of_power(graph, law, value) {
                             Inverse::Value(value) => Said::Value { value, stated: true },
-                            Inverse::Modulated => {
-                                let (column, sign) = own(graph, equations, id, kind.gives());
-                                Said::Power { column, value: sign * value }
-                            }
+                            Inverse::Modulated => Said::Power { column, value: sign * value },
                             Inverse::Roots(found) => {
-                                d.push(no_unique_root(graph, id, *kind, value, &found));
+                                d.push(no_unique_root(graph, end, *kind, value, &found));
                                 Said::Value { value: 0.0, stated: true }
                             }
                         }
@@ -206,7 +205,6 @@ fn say(
                 if let Said::Value { value, .. } = said
                     && let Some(power) = power_of_stored(graph, law, value)
                 {
-                    let (column, sign) = own(graph, equations, id, kind.gives());
                     y[column] = sign * power;
                 }
                 said
@@ -229,15 +227,16 @@ fn say(
     said
 }
 
-/// Column and sign of an element's own power variable.
-fn own(graph: &BondGraph, equations: &Equations, id: VertexId, power: Power) -> (usize, f64) {
-    match graph.vertex(id).bonds.first() {
-        Some(bond) => {
-            let sign = if power == Power::Flow { graph.sign_into(*bond, id, 0) } else { 1.0 };
-            (equations.power(*bond, power), sign)
-        }
-        None => (0, 1.0),
-    }
+/// Column and sign of a port's own power variable, f counted into the element.
+fn own(
+    graph: &BondGraph,
+    equations: &Equations,
+    end: End,
+    bond: BondId,
+    power: Power,
+) -> (usize, f64) {
+    let into = graph.sign_into(bond, end.vertex, end.port);
+    (equations.power(bond, power), if power == Power::Flow { into } else { 1.0 })
 }
 
 /// A stored quantity found from a power variable.
@@ -298,19 +297,19 @@ fn power_of_stored(graph: &BondGraph, law: &StoreLaw, stored: f64) -> Option<f64
 
 fn no_unique_root(
     graph: &BondGraph,
-    id: VertexId,
+    end: End,
     kind: Storage,
     value: f64,
     found: &[f64],
 ) -> Diagnostic {
-    let vertex = graph.vertex(id);
+    let (span, name) = (graph.vertex(end.vertex).span, graph.port_name(end));
     let (power, stored) = letters(kind);
     let message = if found.is_empty() {
-        format!("no {stored} gives {} the {power}0 = {value}", vertex.name)
+        format!("no {stored} gives {name} the {power}0 = {value}")
     } else {
-        format!("more than one {stored} gives {} the {power}0 = {value}", vertex.name)
+        format!("more than one {stored} gives {name} the {power}0 = {value}")
     };
-    let mut diagnostic = Diagnostic::error("E0503", vertex.span, message)
+    let mut diagnostic = Diagnostic::error("E0503", span, message)
         .help(format!("state {stored}0 instead of {power}0"));
     if !found.is_empty() {
         let list: Vec<String> = found.iter().take(5).map(|root| format!("{root:.6}")).collect();
@@ -443,7 +442,7 @@ mod tests {
             let (state, d) = solved(&graph);
             assert!(d.is_empty(), "{d:?}");
             let state = state.unwrap();
-            let of = |id: VertexId| state.storages[id.index()].unwrap();
+            let of = |id: VertexId| state.storage(End::only(id)).unwrap();
             assert!((of(c1).stored - 3.0).abs() < 1e-12 && (of(c2).stored - 6.0).abs() < 1e-12);
             // The current divides as the capacitances do.
             assert!((state.flows[0] - 1.0 / 3.0).abs() < 1e-7, "{:?}", state.flows);
@@ -482,7 +481,7 @@ mod tests {
         for out in [false, true] {
             let (state, _) = solved(&graph(cube(1.0), out));
             let state = state.unwrap();
-            assert_eq!(state.storages[0], Some(StorageValue { stored: 2.0, power: 10.0 }));
+            assert_eq!(state.storages[0], [StorageValue { stored: 2.0, power: 10.0 }]);
             assert_eq!(state.efforts, [10.0]);
             assert_eq!(state.flows, [if out { 5.0 } else { -5.0 }], "along the half arrow");
         }

@@ -9,6 +9,7 @@ pub mod equations;
 pub mod structure;
 pub mod roots;
 pub mod consistent;
+pub mod fields;
 pub mod prepared;
 pub mod initial;
 #[cfg(test)]

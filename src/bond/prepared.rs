@@ -4,10 +4,11 @@ use super::causality::Causality;
 use super::consistent::{self, Trouble};
 use super::equations::compiled::{Compiled, compile};
 use super::equations::{Equations, Origin, Unknown, equations, unknown_name};
-use super::graph::{BondGraph, Initial, Law, Leaf, Storage, StoreInitial, StoreLaw, VertexId};
+use super::graph::{BondGraph, End, Initial, Law, Leaf, Storage, StoreInitial, StoreLaw, VertexId};
 use super::structure::{Linearised, Structure, analyse};
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
+use std::collections::HashMap;
 
 /// The equations, ready to be solved.
 #[derive(Clone, Debug)]
@@ -152,18 +153,21 @@ fn structure(
 /// States from the one that most deserves to stay independent: integrators, then storages with a stated value, then
 /// the others; among these as causality assigned them, else in file order.
 fn preference(graph: &BondGraph, equations: &Equations, causality: &Causality) -> Vec<usize> {
+    let places: HashMap<End, usize> =
+        causality.states.iter().enumerate().map(|(place, end)| (*end, place)).collect();
     let mut states: Vec<usize> = (0..equations.states).collect();
-    states.sort_by_key(|k| {
-        let vertex = match equations.unknowns[*k] {
-            Unknown::Stored(id) | Unknown::Rated(id) => id,
+    states.sort_by_cached_key(|k| {
+        let end = match equations.unknowns[*k] {
+            Unknown::Stored(end) => end,
+            Unknown::Rated(id) => End::only(id),
             _ => return (0, 0, *k),
         };
-        let stated = match &graph.vertex(vertex).law {
+        let stated = match graph.law_at(end) {
             Law::Store { initial, .. } => !matches!(initial, StoreInitial::Unstated),
             Law::Rate { initial, .. } => matches!(initial, Initial::Given(_)),
             _ => false,
         };
-        let place = causality.states.iter().position(|id| *id == vertex).unwrap_or(usize::MAX);
+        let place = places.get(&end).copied().unwrap_or(usize::MAX);
         (if stated { 1 } else { 2 }, place, *k)
     });
     states

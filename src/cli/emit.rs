@@ -41,7 +41,7 @@ pub fn graph_expression(graph: &BondGraph, expr: &graph::Expr) -> String {
             let reading = format!("{}({})", letter(*variable), graph.bond_name(*bond));
             if *negated { format!("(-{reading})") } else { reading }
         }
-        graph::Leaf::Stored(vertex) => format!("stored({})", graph.vertex(*vertex).name),
+        graph::Leaf::Stored(end) => format!("stored({})", graph.port_name(*end)),
     })
 }
 
@@ -157,6 +157,12 @@ fn law(graph: &BondGraph, law: &Law) -> String {
         Law::Rate { kind, rate, initial } => {
             let gives = letter(kind.gives());
             format!("der({gives}) = {}, {gives}0 = {}", text(rate), initial_value(graph, initial))
+        }
+        Law::Field(field) => {
+            let ports = field.ports.iter().enumerate();
+            let ports =
+                ports.map(|(k, port)| format!("port {}: {}", k + 1, self::law(graph, port)));
+            ports.collect::<Vec<_>>().join("; ")
         }
         Law::Transformer(modulus) => format!("transformer, {}", self::modulus(graph, modulus)),
         Law::Gyrator(modulus) => format!("gyrator, {}", self::modulus(graph, modulus)),

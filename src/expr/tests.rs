@@ -83,7 +83,7 @@ macro_rules! toy {
                     return Some(Expr::new(Node::Number(text.parse().unwrap()), span));
                 }
                 if text == "unknown" {
-                    d.push(Diagnostic::error("E0201", span, "unknown name"));
+                    d.push(Diagnostic::error("E0208", span, "unknown name"));
                     return None;
                 }
                 Some(Expr::new(Node::Leaf(text.to_string()), span))
@@ -206,10 +206,10 @@ fn spans_cover_what_they_mean() {
 #[test]
 fn errors_are_collected() {
     let codes = |text| parse_bond(text).unwrap_err().iter().map(|d| d.code).collect::<Vec<_>>();
-    assert_eq!(codes("unknown + sqrt(1, 2) * sqr(4)"), ["E0201", "E0112", "E0210"]);
+    assert_eq!(codes("unknown + sqrt(1, 2) * sqr(4)"), ["E0208", "E0112", "E0210"]);
     assert_eq!(codes("1 < x < 2"), ["E0113"]);
     assert_eq!(codes("max(1; 2)"), ["E0111"]);
-    assert_eq!(codes("if unknown then unknown else 1"), ["E0201", "E0201"]);
+    assert_eq!(codes("if unknown then unknown else 1"), ["E0208", "E0208"]);
     let help = parse_bond("sqr(4)").unwrap_err()[0].help.clone();
     assert_eq!(help.as_deref(), Some("did you mean `sqrt`?"));
 }

@@ -6,7 +6,10 @@
 //! Bonds of pseudo domains, whose e·f is no power, are left out.
 
 use crate::bond::equations::Equations;
-use crate::bond::graph::{BondGraph, BondId, Law, Leaf, Power, Storage, StoreLaw, VertexId};
+use crate::bond::fields;
+use crate::bond::graph::{
+    BondGraph, BondId, End, Field, Law, Leaf, Power, Storage, StoreLaw, VertexId,
+};
 use crate::quantity::Domain;
 
 /// What an element does with energy.
@@ -79,10 +82,10 @@ pub fn balance(
         if !vertex.bonds.iter().all(|bond| carries_power(graph, *bond)) {
             continue;
         }
-        let taken: f64 = match vertex.bonds.first() {
-            Some(bond) => graph.sign_into(*bond, id, 0) * work[bond.index()],
-            None => 0.0,
-        };
+        let taken: f64 = (0..)
+            .zip(&vertex.bonds)
+            .map(|(port, bond)| graph.sign_into(*bond, id, port) * work[bond.index()])
+            .sum();
         let amount = match role {
             Role::Source => -taken,
             Role::Stored => gained(graph, equations, id, start, end).unwrap_or(taken),
@@ -118,6 +121,9 @@ fn role(graph: &BondGraph, id: VertexId) -> Option<Role> {
         Law::Store { law, .. } => {
             Some(if own_only(store_law(law)) { Role::Stored } else { Role::Modulated })
         }
+        Law::Field(_) if graph.storage(End::only(id)).is_none() => Some(Role::Dissipated),
+        Law::Field(_) if fields::is_state_function(graph, id) => Some(Role::Stored),
+        Law::Field(_) => Some(Role::Modulated),
     }
 }
 
@@ -141,8 +147,11 @@ fn gained(
     start: &[f64],
     end: &[f64],
 ) -> Option<f64> {
+    if let Law::Field(field) = &graph.vertex(id).law {
+        return gained_by_field(graph, equations, id, field, start, end);
+    }
     let Law::Store { kind, law, .. } = &graph.vertex(id).law else { return None };
-    let k = equations.stored(id)?;
+    let k = equations.stored(End::only(id))?;
     let bond = *graph.vertex(id).bonds.first()?;
     let value = |x: f64| {
         store_law(law).evaluate(&mut |leaf| match leaf {
@@ -165,6 +174,50 @@ fn gained(
             e1 * q1 - e0 * q0 - integral(&value, e0, e1)
         }
     })
+}
+
+/// E(end) − E(start) of a field whose energy is a state function: ∫ Σ (what port k gives) d(what it stores) along the
+/// straight line between the two states; of a matrix ½ Σ (x1 − x0)·(g1 + g0), which is the same for a symmetric one.
+fn gained_by_field(
+    graph: &BondGraph,
+    equations: &Equations,
+    id: VertexId,
+    field: &Field,
+    start: &[f64],
+    end: &[f64],
+) -> Option<f64> {
+    let ports: Vec<(usize, Storage, BondId)> = graph
+        .law_ports(id)
+        .map(|at| Some((equations.stored(at)?, graph.storage(at)?, graph.bond_at(at)?)))
+        .collect::<Option<_>>()?;
+    if field.matrix.is_some() {
+        let given = |port: u32, kind: &Storage, bond: &BondId, y: &[f64]| {
+            let sign = match kind {
+                Storage::Compliance => 1.0,
+                Storage::Inertia => graph.sign_into(*bond, id, port),
+            };
+            sign * y[equations.power(*bond, kind.gives())]
+        };
+        let parts = (0..).zip(&ports).map(|(port, (k, kind, bond))| {
+            let sum = given(port, kind, bond, start) + given(port, kind, bond, end);
+            0.5 * (end[*k] - start[*k]) * sum
+        });
+        return Some(parts.sum());
+    }
+    let along = |part: f64| -> f64 {
+        let at = |k: usize| start[k] + part * (end[k] - start[k]);
+        let laws = field.ports.iter().zip(&ports).map(|(law, (k, ..))| {
+            let Law::Store { law: StoreLaw::OfStored(law), .. } = law else { return f64::NAN };
+            let given = law.evaluate(&mut |leaf| match leaf {
+                Leaf::Parameter(id) => graph.parameters[id.index()].value,
+                Leaf::Stored(end) => equations.stored(*end).map_or(f64::NAN, at),
+                _ => f64::NAN,
+            });
+            given * (end[*k] - start[*k])
+        });
+        laws.sum()
+    };
+    Some(integral(&along, 0.0, 1.0)).filter(|energy| energy.is_finite())
 }
 
 /// ∫ f from a to b: Gauss-Legendre of 8 points on halves until both agree.

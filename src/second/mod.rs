@@ -342,7 +342,8 @@ fn explain(graph: &BondGraph, prepared: &Prepared, failure: &Failure) -> Diagnos
         Failure::Stop(Stop::StepTooSmall { t, unknown }) => {
             let unknown = equations.unknowns[*unknown];
             let span = match unknown {
-                Unknown::Stored(id) | Unknown::Rated(id) => graph.vertex(id).span,
+                Unknown::Stored(end) => graph.vertex(end.vertex).span,
+                Unknown::Rated(id) => graph.vertex(id).span,
                 Unknown::Signal(id) => graph.signals[id.index()].span,
                 Unknown::Effort(id) | Unknown::Flow(id) => graph.bond(id).span,
             };

@@ -2,7 +2,7 @@
 
 use super::Builder;
 use super::flows::{Carrier, own_device};
-use super::forms::{Form, Integrator, SourceValue, constant_value, expressions};
+use super::forms::{Coupling, Form, Integrator, SourceValue, constant_value, form_at};
 use super::map::Link;
 use super::names::Namer;
 use super::series_parallel::Item;
@@ -20,15 +20,13 @@ pub fn counters(graph: &BondGraph, forms: &[Form], namer: &mut Namer) -> Vec<Opt
     let mut spoken = vec![false; graph.vertices.len()];
     let mut note = |expr: &crate::bond::graph::Expr, own: Option<VertexId>| {
         expr.leaves(&mut |leaf, _| match (leaf, own) {
-            (Leaf::Stored(id), _) => spoken[id.index()] = true,
+            (Leaf::Stored(end), _) => spoken[end.vertex.index()] = true,
             (Leaf::Own(Variable::Stored), Some(id)) => spoken[id.index()] = true,
             _ => {}
         });
     };
     for id in graph.vertex_ids() {
-        if let Some(expr) = expressions(&graph.vertex(id).law) {
-            note(expr, Some(id));
-        }
+        graph.vertex(id).law.expressions(&mut |expr| note(expr, Some(id)));
     }
     for signal in &graph.signals {
         if let SignalLaw::Algebraic(expr) | SignalLaw::Integrator { rate: expr, .. } = &signal.law {
@@ -145,19 +143,20 @@ impl Builder<'_> {
         let (id, port) = (end.vertex, end.port as usize);
         let graph = self.graph;
         let vertex = graph.vertex(id);
-        let what = format!("{}:{}", vertex.kind, vertex.name);
+        let what = format!("{}:{}", vertex.kind, graph.end_name(end));
         let span = vertex.span;
         let (Some(nodes), Some(bond)) = (self.port(id, port), vertex.bonds.get(port).copied())
         else {
             return Ok(());
         };
-        let form = self.forms[id.index()].clone();
+        let form = form_at(&self.forms, end).clone();
         let except = own_device(&form);
         let law = |builder: &Self, law| builder.value(law, Some(id), Speaker::Card { except });
         let from_here = graph.bond(bond).from == end;
         let first = self.cards.len();
         match &form {
-            Form::Junction | Form::Open => {}
+            // A field's ports have forms of their own.
+            Form::Junction | Form::Open | Form::Field { .. } => {}
             Form::Short { device } => {
                 let value = Waveform::Constant(Expr::number(0.0));
                 self.device(*device, nodes, Element::VoltageSource(value), span, &what);
@@ -204,29 +203,29 @@ impl Builder<'_> {
             }
             Form::Capacitor { device, value } => {
                 let value = self.constant(value);
-                let initial = Some(self.initial_power(id));
+                let initial = Some(self.initial_power(end));
                 self.device(*device, nodes, Element::Capacitor { value, initial }, span, &what);
             }
             Form::Inductor { device, value } => {
                 let value = self.constant(value);
-                let initial = Some(self.initial_power(id));
+                let initial = Some(self.initial_power(end));
                 self.device(*device, nodes, Element::Inductor { value, initial }, span, &what);
             }
             Form::StoredEffort { device, state, law: expr } => {
                 let law = law(self, expr)?;
                 self.device(*device, nodes, Element::BehaviouralVoltage { law }, span, &what);
                 let feed = self.current(Carrier { device: *device, negated: false });
-                let initial = self.initial_stored(id);
+                let initial = self.initial_stored(end);
                 self.integrator(*state, feed, initial, span, &what);
             }
             Form::StoredFlow { device, state, law: expr } => {
                 let law = law(self, expr)?;
                 self.device(*device, nodes, Element::BehaviouralCurrent { law }, span, &what);
-                self.integrator(*state, self.voltage(nodes), self.initial_stored(id), span, &what);
+                self.integrator(*state, self.voltage(nodes), self.initial_stored(end), span, &what);
             }
             Form::ChargeLaw { device, state, law: expr } => {
                 let law = law(self, expr)?;
-                self.held_integral(*state, law, self.initial_stored(id), span, &what);
+                self.held_integral(*state, law, self.initial_stored(end), span, &what);
                 // The integral's source gives the capacitor its current, dq/dt, out of its own +.
                 let gain = Expr::number(-1.0);
                 let follow = Element::Cccs { gain, control: state.feed };
@@ -234,7 +233,7 @@ impl Builder<'_> {
             }
             Form::FluxLaw { device, state, law: expr } => {
                 let law = law(self, expr)?;
-                self.held_integral(*state, law, self.initial_stored(id), span, &what);
+                self.held_integral(*state, law, self.initial_stored(end), span, &what);
                 let gain = Expr::number(-1.0);
                 let follow = Element::Ccvs { gain, control: state.feed };
                 self.device(*device, nodes, follow, span, &what);
@@ -244,10 +243,10 @@ impl Builder<'_> {
                 let gain = Expr::number(1.0);
                 self.device(*device, nodes, Element::Vcvs { gain, control }, span, &what);
                 let rate = law(self, rate)?;
-                self.integrator(*state, rate, self.initial_power(id), span, &what);
+                self.integrator(*state, rate, self.initial_power(end), span, &what);
                 if let Some(counter) = self.counters[id.index()] {
                     let flow = self.current(Carrier { device: *device, negated: false });
-                    self.integrator(counter, flow, self.initial_stored(id), span, &what);
+                    self.integrator(counter, flow, self.initial_stored(end), span, &what);
                 }
             }
             Form::RateFlow { device, state, rate } => {
@@ -255,10 +254,10 @@ impl Builder<'_> {
                 let gain = Expr::number(1.0);
                 self.device(*device, nodes, Element::Vccs { gain, control }, span, &what);
                 let rate = law(self, rate)?;
-                self.integrator(*state, rate, self.initial_power(id), span, &what);
+                self.integrator(*state, rate, self.initial_power(end), span, &what);
                 if let Some(counter) = self.counters[id.index()] {
                     let effort = self.voltage(nodes);
-                    self.integrator(counter, effort, self.initial_stored(id), span, &what);
+                    self.integrator(counter, effort, self.initial_stored(end), span, &what);
                 }
             }
             Form::Transformer { lead, effort, flow, modulus, modulated } => {
@@ -326,6 +325,32 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Adds the cards of fields that belong to no single port.
+    pub(super) fn coupling_cards(&mut self) {
+        for id in self.graph.vertex_ids() {
+            let Form::Field { couplings, .. } = &self.forms[id.index()] else { continue };
+            let couplings = couplings.clone();
+            let vertex = self.graph.vertex(id);
+            if !couplings.is_empty() {
+                self.comment(format!(" {}", vertex.name));
+            }
+            for Coupling { device, inductors, ports: [first, second], value } in couplings {
+                let what = format!(
+                    "{}:{name}.{} and {name}.{}",
+                    vertex.kind,
+                    first + 1,
+                    second + 1,
+                    name = vertex.name
+                );
+                let element = Element::Mutual {
+                    inductors: inductors.to_vec(),
+                    coupling: self.constant(&value),
+                };
+                self.device_on(device, vec![], element, vertex.span, &what);
+            }
+        }
+    }
+
     /// A node whose voltage is the integral of `rate`, from `initial`.
     pub(super) fn integrator(
         &mut self,
@@ -375,10 +400,9 @@ impl Builder<'_> {
     }
 
     /// The power variable that a storage starts with, as it was stated where that is what it starts with.
-    fn initial_power(&self, id: VertexId) -> Expr {
-        let value =
-            self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.power);
-        let stated = match &self.graph.vertex(id).law {
+    fn initial_power(&self, end: End) -> Expr {
+        let value = self.initial.storage(end).map_or(0.0, |s| s.power);
+        let stated = match self.graph.law_at(end) {
             Law::Store { initial: StoreInitial::Power(stated), .. }
             | Law::Rate { initial: Initial::Given(stated), .. } => Some(stated.clone()),
             Law::Store {
@@ -392,10 +416,9 @@ impl Builder<'_> {
     }
 
     /// q or p that a storage starts with.
-    fn initial_stored(&self, id: VertexId) -> Expr {
-        let value =
-            self.initial.storages.get(id.index()).copied().flatten().map_or(0.0, |s| s.stored);
-        let stated = match &self.graph.vertex(id).law {
+    fn initial_stored(&self, end: End) -> Expr {
+        let value = self.initial.storage(end).map_or(0.0, |s| s.stored);
+        let stated = match self.graph.law_at(end) {
             Law::Store { initial: StoreInitial::Stored(stated), .. } => Some(stated),
             _ => None,
         };

@@ -2,7 +2,7 @@
 //! added because a law, a linked source or a column needs a flow that nothing carries.
 
 use super::forest::Forest;
-use super::forms::{Form, SourceValue, constant_value, is_constant};
+use super::forms::{Form, SourceValue, constant_value, form_at, is_constant};
 use super::islands::is_junction;
 use super::names::Namer;
 use crate::bond::graph::{
@@ -25,11 +25,11 @@ pub enum Origin {
     /// The current of a voltage source.
     Carrier(Carrier),
     /// The current of a linear inertia's inductor.
-    Inductor(VertexId),
+    Inductor(End),
     /// Effort over resistance of a linear dissipator.
     Ohm(VertexId),
-    /// An element's law gives its flow.
-    Law(VertexId),
+    /// An element's law gives its flow at this port.
+    Law(End),
     /// A two-port's law gives the flow of this port.
     Port(VertexId, usize),
     /// A detector of effort: 0.
@@ -37,7 +37,7 @@ pub enum Origin {
     /// The flows of a 0-junction add up to zero; of this bond all others are known.
     Balance(VertexId, BondId),
     /// The current of a capacitor or current source: our simulator knows it, others do not save it by that name.
-    Current(VertexId),
+    Current(End),
 }
 
 /// A 0 V source in a bond.
@@ -154,25 +154,25 @@ impl Flows {
                 self.learn(bond, Origin::Carrier(carrier));
             }
         }
-        type Tell = fn(&Form, VertexId) -> Option<Origin>;
+        type Tell = fn(&Form, End) -> Option<Origin>;
         let told_by_elements: [Tell; 2] = [
-            |form, vertex| match form {
-                Form::Inductor { .. } => Some(Origin::Inductor(vertex)),
+            |form, end| match form {
+                Form::Inductor { .. } => Some(Origin::Inductor(end)),
                 Form::Open => Some(Origin::Nothing),
                 _ => None,
             },
-            |form, vertex| match form {
-                Form::Resistor { .. } => Some(Origin::Ohm(vertex)),
+            |form, end| match form {
+                Form::Resistor { .. } => Some(Origin::Ohm(end.vertex)),
                 Form::FlowSource {
                     value: SourceValue::Constant(_) | SourceValue::Copy(_), ..
-                } => Some(Origin::Law(vertex)),
+                } => Some(Origin::Law(end)),
                 _ => None,
             },
         ];
         for tell in told_by_elements {
             for bond in graph.bond_ids() {
                 for end in [graph.bond(bond).from, graph.bond(bond).to] {
-                    let told = tell(&forms[end.vertex.index()], end.vertex);
+                    let told = tell(form_at(forms, end), end);
                     match told {
                         Some(Origin::Ohm(_)) if resistor_of(graph, bond).is_none() => {}
                         Some(origin) => self.learn(bond, origin),
@@ -184,9 +184,8 @@ impl Flows {
         while self.follow_laws(graph, forms) || self.follow_balances(graph) {}
         for bond in graph.bond_ids() {
             for end in [graph.bond(bond).from, graph.bond(bond).to] {
-                if let Form::Capacitor { .. } | Form::FlowSource { .. } = forms[end.vertex.index()]
-                {
-                    self.learn(bond, Origin::Current(end.vertex));
+                if let Form::Capacitor { .. } | Form::FlowSource { .. } = form_at(forms, end) {
+                    self.learn(bond, Origin::Current(end));
                 }
             }
         }
@@ -211,12 +210,12 @@ impl Flows {
                     continue;
                 }
                 let (vertex, port) = (end.vertex, end.port as usize);
-                let form = &forms[vertex.index()];
+                let form = form_at(forms, end);
                 let (law, origin, also) = match form {
                     Form::FlowSource { value: SourceValue::Law(law), .. }
                     | Form::FlowLaw { law, .. }
-                    | Form::StoredFlow { law, .. } => (Some(law), Origin::Law(vertex), None),
-                    Form::RateFlow { .. } => (None, Origin::Law(vertex), None),
+                    | Form::StoredFlow { law, .. } => (Some(law), Origin::Law(end), None),
+                    Form::RateFlow { .. } => (None, Origin::Law(end), None),
                     Form::Transformer { modulus, .. } => {
                         (Some(modulus), Origin::Port(vertex, port), Some(1 - port))
                     }
@@ -304,6 +303,13 @@ fn carriers(form: &Form) -> Vec<(usize, u32, Name, bool)> {
         Form::GyratorEfforts { devices, modulated: true, .. } => {
             vec![(0, 2, devices[0], false), (1, 2, devices[1], false)]
         }
+        Form::Field { ports, .. } => {
+            let at = |port: usize, form: &Form| {
+                let carried = carriers(form).into_iter();
+                carried.map(move |(_, rank, device, negated)| (port, rank, device, negated))
+            };
+            ports.iter().enumerate().flat_map(|(port, form)| at(port, form)).collect()
+        }
         Form::GyratorEfforts { modulated: false, .. }
         | Form::Junction
         | Form::Open
@@ -353,10 +359,16 @@ fn needs(graph: &BondGraph, forms: &[Form]) -> Vec<Need> {
                 }
             }
         }
-        if let Some(expr) = super::forms::expressions(&vertex.law) {
-            let except = own_device(form);
-            needs_of(graph, forms, expr, Some(id), &mut |bond| {
-                needs.push(Need { bond, except, hard: false });
+        for end in graph.law_ports(id) {
+            let form = form_at(forms, end);
+            // Coupled inductors need nobody to tell them each other's currents.
+            if let Form::Inductor { .. } = form {
+                continue;
+            }
+            graph.law_at(end).expressions(&mut |expr| {
+                needs_of(graph, forms, expr, Some(id), &mut |bond| {
+                    needs.push(Need { bond, except: own_device(form), hard: false });
+                });
             });
         }
         // A resistance that is modulated multiplies the element's own flow, which its expression does not name.
@@ -388,26 +400,33 @@ fn needs_of(
     own: Option<VertexId>,
     need: &mut dyn FnMut(BondId),
 ) {
-    let mut of_vertex = |vertex: Option<VertexId>| {
-        if let Some(bond) = vertex.and_then(|v| graph.vertex(v).bonds.first()) {
-            need(*bond);
-        }
-    };
+    let own = own.map(End::only);
     let mut bonds = Vec::new();
     expr.leaves(&mut |leaf, _| match leaf {
         Leaf::Bond { bond, variable: Power::Flow, .. } => bonds.push(*bond),
-        Leaf::Own(Variable::Power(Power::Flow)) => of_vertex(own),
+        Leaf::Own(Variable::Power(Power::Flow)) => {
+            bonds.extend(own.and_then(|end| graph.bond_at(end)));
+        }
         Leaf::Own(Variable::Stored) => {
-            if let Some(id) = own.filter(|id| matches!(forms[id.index()], Form::Inductor { .. })) {
-                of_vertex(Some(id));
+            if let Some(end) = own {
+                flux_needs(graph, forms, end, &mut bonds);
             }
         }
-        Leaf::Stored(id) if matches!(forms[id.index()], Form::Inductor { .. }) => {
-            of_vertex(Some(*id));
-        }
+        Leaf::Stored(end) => flux_needs(graph, forms, *end, &mut bonds),
         _ => {}
     });
     bonds.into_iter().for_each(need);
+}
+
+/// The flows that p of an inductor is made of: its own, and in a field those of the others.
+fn flux_needs(graph: &BondGraph, forms: &[Form], end: End, bonds: &mut Vec<BondId>) {
+    let Form::Inductor { .. } = form_at(forms, end) else { return };
+    match (&graph.vertex(end.vertex).law, graph.law_at(end)) {
+        (Law::Field(_), law) => law.expressions(&mut |expr| {
+            needs_of(graph, forms, expr, None, &mut |bond| bonds.push(bond));
+        }),
+        _ => bonds.extend(graph.bond_at(end)),
+    }
 }
 
 /// The linear dissipator of constant resistance other than 0 at an end of a bond.

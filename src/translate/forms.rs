@@ -3,10 +3,10 @@
 use super::names::Namer;
 use crate::bond::causality::Causality;
 use crate::bond::graph::{
-    BondGraph, Dissipation, Expr, Law, Leaf, Modulus, ParameterId, Power, SignalId, SignalLaw,
-    Storage, StoreLaw, Stroke, Variable, VertexId,
+    BondGraph, Dissipation, End, Expr, Field, Law, Leaf, Modulus, ParameterId, Power, SignalId,
+    SignalLaw, Storage, StoreLaw, Stroke, Variable, VertexId,
 };
-use crate::expr::{Binary, Node};
+use crate::expr::{Binary, Function, Node};
 use crate::netlist::Name;
 
 /// An integrator: a node whose voltage is the integral of what `feed` injects into 1 F.
@@ -132,6 +132,33 @@ pub enum Form {
         modulus: Expr,
         modulated: bool,
     },
+    /// A field: the form of each port, and what couples them besides.
+    Field {
+        ports: Vec<Form>,
+        couplings: Vec<Coupling>,
+    },
+}
+
+/// A coupling of the inductors of two ports: M = k·√(L1·L2).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupling {
+    /// The K device.
+    pub device: Name,
+    /// The inductors.
+    pub inductors: [Name; 2],
+    /// The two ports, from 0.
+    pub ports: [usize; 2],
+    /// k.
+    pub value: Expr,
+}
+
+/// The form at a port.
+pub fn form_at(forms: &[Form], end: End) -> &Form {
+    let form = &forms[end.vertex.index()];
+    match form {
+        Form::Field { ports, .. } => ports.get(end.port as usize).unwrap_or(form),
+        _ => form,
+    }
 }
 
 /// Whether an expression speaks of parameters alone.
@@ -172,9 +199,7 @@ impl Uses {
             });
         };
         for vertex in &graph.vertices {
-            if let Some(expr) = expressions(&vertex.law) {
-                count(expr, &mut uses.laws);
-            }
+            vertex.law.expressions(&mut |expr| count(expr, &mut uses.laws));
         }
         for signal in &graph.signals {
             match &signal.law {
@@ -188,26 +213,6 @@ impl Uses {
             count(&observation.expr, &mut uses.observed);
         }
         uses
-    }
-}
-
-/// The expressions of a law that hold during the whole run.
-pub fn expressions(law: &Law) -> Option<&Expr> {
-    match law {
-        Law::Zero | Law::One => None,
-        Law::Source { value, detector, .. } => (!detector).then_some(value),
-        Law::Dissipator(
-            Dissipation::Linear(expr) | Dissipation::Effort(expr) | Dissipation::Flow(expr),
-        ) => Some(expr),
-        Law::Store { law, .. } => match law {
-            StoreLaw::Linear(expr) | StoreLaw::OfStored(expr) | StoreLaw::OfPower(expr) => {
-                Some(expr)
-            }
-        },
-        Law::Rate { rate, .. } => Some(rate),
-        Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
-            Modulus::Ratio(expr) | Modulus::Gain(expr) => Some(expr),
-        },
     }
 }
 
@@ -230,7 +235,6 @@ fn form(
 ) -> Form {
     let vertex = graph.vertex(id);
     let name = vertex.name.as_str();
-    let own = |power| Expr::leaf(Leaf::Own(Variable::Power(power)));
     match &vertex.law {
         Law::Zero | Law::One => Form::Junction,
         Law::Source { sets: Power::Flow, detector: true, .. } => Form::Open,
@@ -251,46 +255,8 @@ fn form(
                 (Power::Flow, false) => Form::FlowSource { device: namer.device('G', name), value },
             }
         }
-        Law::Dissipator(Dissipation::Linear(value)) if is_constant(value) => {
-            Form::Resistor { device: namer.device('R', name), value: value.clone() }
-        }
-        Law::Dissipator(Dissipation::Linear(value)) => Form::EffortLaw {
-            device: namer.device('E', name),
-            law: value.clone().binary(Binary::Multiply, own(Power::Flow)),
-        },
-        Law::Dissipator(Dissipation::Effort(law)) => {
-            Form::EffortLaw { device: namer.device('E', name), law: law.clone() }
-        }
-        Law::Dissipator(Dissipation::Flow(law)) => {
-            Form::FlowLaw { device: namer.device('G', name), law: law.clone() }
-        }
-        Law::Store { kind, law: StoreLaw::Linear(value), .. } if is_constant(value) => match kind {
-            Storage::Compliance => {
-                Form::Capacitor { device: namer.device('C', name), value: value.clone() }
-            }
-            Storage::Inertia => {
-                Form::Inductor { device: namer.device('L', name), value: value.clone() }
-            }
-        },
-        Law::Store { kind, law: StoreLaw::Linear(value), .. } => {
-            let stored = Expr::leaf(Leaf::Own(Variable::Stored));
-            stored_form(namer, name, *kind, stored.binary(Binary::Divide, value.clone()))
-        }
-        Law::Store { kind, law: StoreLaw::OfStored(law), .. } => {
-            stored_form(namer, name, *kind, law.clone())
-        }
-        Law::Store { kind: Storage::Compliance, law: StoreLaw::OfPower(law), .. } => {
-            Form::ChargeLaw {
-                device: namer.device('F', name),
-                state: integrator(namer, name, "q", 'E'),
-                law: law.clone(),
-            }
-        }
-        Law::Store { kind: Storage::Inertia, law: StoreLaw::OfPower(law), .. } => Form::FluxLaw {
-            device: namer.device('H', name),
-            state: integrator(namer, name, "p", 'E'),
-            law: law.clone(),
-        },
+        Law::Dissipator(law) => dissipator(namer, name, law),
+        Law::Store { kind, law, .. } => store(namer, name, *kind, law),
         Law::Rate { kind: Storage::Compliance, rate, .. } => Form::RateEffort {
             device: namer.device('E', name),
             state: integrator(namer, name, "e", 'G'),
@@ -301,6 +267,7 @@ fn form(
             state: integrator(namer, name, "f", 'G'),
             rate: rate.clone(),
         },
+        Law::Field(field) => self::field(namer, name, field),
         Law::Transformer(modulus) => {
             let (mut lead, mut value) = match modulus {
                 Modulus::Ratio(value) => (0, value.clone()),
@@ -346,6 +313,94 @@ fn form(
             }
         }
     }
+}
+
+fn dissipator(namer: &mut Namer, name: &str, law: &Dissipation) -> Form {
+    let own = |power| Expr::leaf(Leaf::Own(Variable::Power(power)));
+    match law {
+        Dissipation::Linear(value) if is_constant(value) => {
+            Form::Resistor { device: namer.device('R', name), value: value.clone() }
+        }
+        Dissipation::Linear(value) => Form::EffortLaw {
+            device: namer.device('E', name),
+            law: value.clone().binary(Binary::Multiply, own(Power::Flow)),
+        },
+        Dissipation::Effort(law) => {
+            Form::EffortLaw { device: namer.device('E', name), law: law.clone() }
+        }
+        Dissipation::Flow(law) => {
+            Form::FlowLaw { device: namer.device('G', name), law: law.clone() }
+        }
+    }
+}
+
+fn store(namer: &mut Namer, name: &str, kind: Storage, law: &StoreLaw) -> Form {
+    match (law, kind) {
+        (StoreLaw::Linear(value), Storage::Compliance) if is_constant(value) => {
+            Form::Capacitor { device: namer.device('C', name), value: value.clone() }
+        }
+        (StoreLaw::Linear(value), Storage::Inertia) if is_constant(value) => {
+            Form::Inductor { device: namer.device('L', name), value: value.clone() }
+        }
+        (StoreLaw::Linear(value), _) => {
+            let stored = Expr::leaf(Leaf::Own(Variable::Stored));
+            stored_form(namer, name, kind, stored.binary(Binary::Divide, value.clone()))
+        }
+        (StoreLaw::OfStored(law), _) => stored_form(namer, name, kind, law.clone()),
+        (StoreLaw::OfPower(law), Storage::Compliance) => Form::ChargeLaw {
+            device: namer.device('F', name),
+            state: integrator(namer, name, "q", 'E'),
+            law: law.clone(),
+        },
+        (StoreLaw::OfPower(law), Storage::Inertia) => Form::FluxLaw {
+            device: namer.device('H', name),
+            state: integrator(namer, name, "p", 'E'),
+            law: law.clone(),
+        },
+    }
+}
+
+/// A constant matrix of inertias is a set of coupled inductors; the ports of any other field have the forms that the
+/// same laws have by themselves.
+fn field(namer: &mut Namer, name: &str, field: &Field) -> Form {
+    let port_name = |port: usize| format!("{name}_{}", port + 1);
+    let inertias = |rows: &&Vec<Vec<Expr>>| {
+        let inertia = |law| matches!(law, &Law::Store { kind: Storage::Inertia, .. });
+        field.ports.iter().all(inertia) && rows.iter().flatten().all(is_constant)
+    };
+    let Some(rows) = field.matrix.as_ref().filter(inertias) else {
+        let ports = field.ports.iter().enumerate().map(|(port, law)| match law {
+            Law::Store { kind, law, .. } => store(namer, &port_name(port), *kind, law),
+            Law::Dissipator(law) => dissipator(namer, &port_name(port), law),
+            _ => Form::Open,
+        });
+        return Form::Field { ports: ports.collect(), couplings: vec![] };
+    };
+    let own: Vec<&Expr> = rows.iter().enumerate().filter_map(|(k, row)| row.get(k)).collect();
+    let inductors: Vec<Name> =
+        (0..own.len()).map(|port| namer.device('L', &port_name(port))).collect();
+    let mut couplings = vec![];
+    for second in 1..own.len() {
+        for first in 0..second {
+            let Some(mutual) = rows[first].get(second).filter(|m| m.as_number() != Some(0.0))
+            else {
+                continue;
+            };
+            let product = own[first].clone().binary(Binary::Multiply, own[second].clone());
+            let root = Expr::call(Function::Sqrt, vec![product]);
+            let value = mutual.clone().binary(Binary::Divide, root);
+            let value = value.constant().map_or(value, Expr::number);
+            couplings.push(Coupling {
+                device: namer.device('K', &format!("{}_{}", port_name(first), second + 1)),
+                inductors: [inductors[first], inductors[second]],
+                ports: [first, second],
+                value,
+            });
+        }
+    }
+    let ports = inductors.into_iter().zip(own);
+    let ports = ports.map(|(device, value)| Form::Inductor { device, value: value.clone() });
+    Form::Field { ports: ports.collect(), couplings }
 }
 
 fn stored_form(namer: &mut Namer, name: &str, kind: Storage, law: Expr) -> Form {

@@ -190,8 +190,8 @@ impl Builder<'_> {
         let of = |bond: BondId| self.graph.bond(bond).domain;
         match &*expr.node {
             Node::Leaf(graph::Leaf::Bond { bond, .. }) => of(*bond),
-            Node::Leaf(graph::Leaf::Stored(vertex)) => {
-                self.graph.vertex(*vertex).bonds.first().map_or(Domain::Any, |bond| of(*bond))
+            Node::Leaf(graph::Leaf::Stored(end)) => {
+                self.graph.bond_at(*end).map_or(Domain::Any, of)
             }
             Node::Unary(Unary::Negate, inner) => self.domain(inner),
             Node::Binary(Binary::Multiply, a, b) => match (&*a.node, &*b.node) {
@@ -256,21 +256,26 @@ impl Builder<'_> {
                         push(format!("f({name}.{port})"), flow, row.flow, domain);
                     }
                 }
-                law => {
-                    // Sources count along the half arrow, all others into the element.
-                    let flow = match law {
-                        Law::Source { detector: false, .. } => self.flow(first, Speaker::Output),
-                        _ => self.own_power(id, Power::Flow, Speaker::Output),
-                    };
-                    push(format!("e({name})"), self.effort(first), row.effort, domain);
-                    push(format!("f({name})"), flow, row.flow, domain);
-                    if let Law::Store { kind, .. } | Law::Rate { kind, .. } = law {
-                        let (letter, unit) = match kind {
-                            Storage::Compliance => ('q', row.displacement),
-                            Storage::Inertia => ('p', row.momentum),
+                _ => {
+                    for end in graph.law_ports(id) {
+                        let Some(bond) = graph.bond_at(end) else { continue };
+                        let (name, domain) = (graph.end_name(end), graph.bond(bond).domain);
+                        let row = domain.row();
+                        // Sources count along the half arrow, all others into the element.
+                        let flow = match &vertex.law {
+                            Law::Source { detector: false, .. } => self.flow(bond, Speaker::Output),
+                            _ => self.own_power(end, Power::Flow, Speaker::Output),
                         };
-                        let stored = self.stored(id, Speaker::Output);
-                        push(format!("{letter}({name})"), stored, unit, domain);
+                        push(format!("e({name})"), self.effort(bond), row.effort, domain);
+                        push(format!("f({name})"), flow, row.flow, domain);
+                        if let Some(kind) = graph.storage(end) {
+                            let (letter, unit) = match kind {
+                                Storage::Compliance => ('q', row.displacement),
+                                Storage::Inertia => ('p', row.momentum),
+                            };
+                            let stored = self.stored(end, Speaker::Output);
+                            push(format!("{letter}({name})"), stored, unit, domain);
+                        }
                     }
                 }
             }

@@ -96,6 +96,7 @@ pub fn translate(
     builder.check(diagnostics);
     builder.parameter_cards();
     builder.island_cards(diagnostics);
+    builder.coupling_cards();
     builder.signal_cards(diagnostics);
     let map = builder.map();
     let header = builder.experiment_cards(diagnostics);
@@ -223,12 +224,24 @@ impl Builder<'_> {
 
     /// Adds a device; its comment is the place in the bond graph and what stands there.
     fn device(&mut self, name: Name, nodes: [Name; 2], element: Element, span: Span, what: &str) {
+        self.device_on(name, nodes.to_vec(), element, span, what);
+    }
+
+    /// The same for a device of any number of nodes.
+    fn device_on(
+        &mut self,
+        name: Name,
+        nodes: Vec<Name>,
+        element: Element,
+        span: Span,
+        what: &str,
+    ) {
         let comment = match self.place(span) {
             Some(place) => format!("{place} {what}"),
             None => what.to_string(),
         };
         self.cards.push(Card {
-            kind: CardKind::Device(Device { name, nodes: nodes.to_vec(), element }),
+            kind: CardKind::Device(Device { name, nodes, element }),
             span,
             comment: Some(comment),
         });

@@ -2,9 +2,9 @@
 
 use super::Builder;
 use super::flows::{Carrier, Origin};
-use super::forms::{Form, SourceValue};
+use super::forms::{Form, SourceValue, form_at};
 use super::signals::Place;
-use crate::bond::graph::{self, BondId, Leaf, Power, Variable, VertexId};
+use crate::bond::graph::{self, BondId, End, Law, Leaf, Power, StoreLaw, Variable, VertexId};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Node, Unary};
 use crate::netlist::{self, Expr, Name};
@@ -101,6 +101,7 @@ fn tidied(expr: Expr) -> (Expr, bool) {
         }
         Node::If(c, a, b) => (at(Node::If(tidy(c), tidy(a), tidy(b))), false),
         Node::Table(a, table) => (at(Node::Table(tidy(a), table)), false),
+        Node::Number(value) if value < 0.0 => (at(Node::Number(-value)), true),
         node @ (Node::Number(_) | Node::Leaf(_)) => (at(node), false),
     }
 }
@@ -169,9 +170,9 @@ impl Builder<'_> {
             }
             Leaf::Signal(id) => at(self.signal(self.signal_places[id.index()])),
             Leaf::Time => at(Some(Expr::leaf(netlist::Leaf::Time))),
-            Leaf::Own(variable) => at(own.and_then(|vertex| match variable {
-                Variable::Power(power) => self.own_power(vertex, *power, speaker),
-                Variable::Stored => self.stored(vertex, speaker),
+            Leaf::Own(variable) => at(own.map(End::only).and_then(|end| match variable {
+                Variable::Power(power) => self.own_power(end, *power, speaker),
+                Variable::Stored => self.stored(end, speaker),
             })),
             Leaf::Bond { bond, variable, negated } => {
                 let value = match variable {
@@ -180,7 +181,7 @@ impl Builder<'_> {
                 };
                 at(value.map(|value| signed(value, *negated)))
             }
-            Leaf::Stored(vertex) => at(self.stored(*vertex, speaker)),
+            Leaf::Stored(end) => at(self.stored(*end, speaker)),
         }
     }
 
@@ -192,12 +193,12 @@ impl Builder<'_> {
         }
     }
 
-    /// A one-port's own effort, or its own flow, counted into it.
-    pub fn own_power(&self, vertex: VertexId, power: Power, speaker: Speaker) -> Option<Expr> {
-        let bond = *self.graph.vertex(vertex).bonds.first()?;
+    /// The effort at an element's port, or the flow counted into it there.
+    pub fn own_power(&self, end: End, power: Power, speaker: Speaker) -> Option<Expr> {
+        let bond = self.graph.bond_at(end)?;
         match power {
-            Power::Effort => Some(self.voltage(self.port(vertex, 0)?)),
-            Power::Flow => self.inflow(vertex, 0, bond, speaker),
+            Power::Effort => Some(self.voltage(self.port(end.vertex, end.port as usize)?)),
+            Power::Flow => self.inflow(end.vertex, end.port, bond, speaker),
         }
     }
 
@@ -213,18 +214,25 @@ impl Builder<'_> {
         Some(signed(self.flow(bond, speaker)?, outward))
     }
 
-    /// q of a compliance, p of an inertia.
-    pub fn stored(&self, vertex: VertexId, speaker: Speaker) -> Option<Expr> {
+    /// q of a compliance, p of an inertia, at its port.
+    pub fn stored(&self, end: End, speaker: Speaker) -> Option<Expr> {
         let integral = |node| self.voltage([node, self.ground()]);
-        match &self.forms[vertex.index()] {
+        let vertex = end.vertex;
+        match form_at(&self.forms, end) {
             Form::Capacitor { value, .. } => {
-                let effort = self.own_power(vertex, Power::Effort, speaker)?;
+                let effort = self.own_power(end, Power::Effort, speaker)?;
                 Some(product(self.constant(value), effort))
             }
-            Form::Inductor { value, .. } => {
-                let flow = self.own_power(vertex, Power::Flow, speaker)?;
-                Some(product(self.constant(value), flow))
-            }
+            Form::Inductor { value, .. } => match self.graph.law_at(end) {
+                // Of coupled inductors each has a part in the other's flux.
+                Law::Store { law: StoreLaw::OfPower(law), .. } => {
+                    self.value(law, None, speaker).ok()
+                }
+                _ => {
+                    let flow = self.own_power(end, Power::Flow, speaker)?;
+                    Some(product(self.constant(value), flow))
+                }
+            },
             Form::StoredEffort { state, .. }
             | Form::StoredFlow { state, .. }
             | Form::ChargeLaw { state, .. }
@@ -256,7 +264,7 @@ impl Builder<'_> {
     /// Effort over resistance, along the half arrow of the dissipator's bond.
     fn ohm(&self, vertex: VertexId, bond: BondId) -> Option<Expr> {
         let Form::Resistor { value, .. } = &self.forms[vertex.index()] else { return None };
-        let effort = self.own_power(vertex, Power::Effort, Speaker::Output)?;
+        let effort = self.own_power(End::only(vertex), Power::Effort, Speaker::Output)?;
         let (effort, negative) = unsigned(effort);
         let flow = effort.binary(Binary::Divide, self.constant(value));
         let outward = self.graph.sign_into(bond, vertex, 0) < 0.0;
@@ -265,15 +273,14 @@ impl Builder<'_> {
 
     /// The flow of the bond that an origin speaks of.
     fn told(&self, bond: BondId, origin: Origin) -> Option<Expr> {
-        let outward =
-            |vertex: VertexId, port: usize| self.graph.sign_into(bond, vertex, port as u32) < 0.0;
+        let outward = |end: End| self.graph.sign_into(bond, end.vertex, end.port) < 0.0;
         match origin {
             Origin::Carrier(carrier) => Some(self.current(carrier)),
-            Origin::Inductor(vertex) | Origin::Current(vertex) => {
-                match &self.forms[vertex.index()] {
+            Origin::Inductor(end) | Origin::Current(end) => {
+                match form_at(&self.forms, end) {
                     Form::Inductor { device, .. } | Form::Capacitor { device, .. } => {
                         let current = Expr::leaf(netlist::Leaf::Current(*device));
-                        Some(signed(current, outward(vertex, 0)))
+                        Some(signed(current, outward(end)))
                     }
                     // A current source stands along the half arrow.
                     Form::FlowSource { device, .. } => {
@@ -284,26 +291,28 @@ impl Builder<'_> {
             }
             Origin::Ohm(vertex) => self.ohm(vertex, bond),
             Origin::Nothing => Some(Expr::number(0.0)),
-            Origin::Law(vertex) => match &self.forms[vertex.index()] {
+            Origin::Law(end) => match form_at(&self.forms, end) {
                 Form::FlowSource { value, .. } => match value {
                     SourceValue::Constant(value) => Some(self.constant(value)),
                     SourceValue::Copy(signal) => self.signal(self.signal_places[signal.index()]),
-                    SourceValue::Law(law) => self.value(law, Some(vertex), Speaker::Output).ok(),
+                    SourceValue::Law(law) => {
+                        self.value(law, Some(end.vertex), Speaker::Output).ok()
+                    }
                     SourceValue::Waveform(_) => None,
                 },
                 Form::FlowLaw { law, .. } | Form::StoredFlow { law, .. } => {
-                    let flow = self.value(law, Some(vertex), Speaker::Output).ok()?;
-                    Some(signed(flow, outward(vertex, 0)))
+                    let flow = self.value(law, Some(end.vertex), Speaker::Output).ok()?;
+                    Some(signed(flow, outward(end)))
                 }
                 Form::RateFlow { state, .. } => {
                     let flow = self.voltage([state.node, self.ground()]);
-                    Some(signed(flow, outward(vertex, 0)))
+                    Some(signed(flow, outward(end)))
                 }
                 _ => None,
             },
             Origin::Port(vertex, port) => {
                 let inflow = self.port_law(vertex, port)?;
-                Some(signed(inflow, outward(vertex, port)))
+                Some(signed(inflow, outward(End { vertex, port: port as u32 })))
             }
             Origin::Balance(junction, _) => {
                 let terms: Option<Vec<Expr>> = self

@@ -103,39 +103,45 @@ pub fn strokes(graph: &BondGraph, rings: &[Vec<BondId>]) -> Causality {
     let mut causality = Causality { strokes, conflicts, ..Causality::default() };
     let states = by_preference(graph)
         .into_iter()
-        .filter(|&(id, kind)| super::is_integral(graph, &causality, id, kind) == Some(true));
-    causality.states = states.map(|(id, _)| id).collect();
+        .filter(|&(end, kind)| super::is_integral(graph, &causality, end, kind) == Some(true));
+    causality.states = states.map(|(end, _)| end).collect();
     causality
 }
 
-/// Storages: those with a stated initial value, then those with a non-linear law, then the others.
-fn by_preference(graph: &BondGraph) -> Vec<(VertexId, Storage)> {
-    let mut storages: Vec<(bool, bool, VertexId, Storage)> = graph
-        .vertex_ids()
-        .filter_map(|id| {
-            let (kind, stated, linear) = match &graph.vertex(id).law {
-                Law::Store { kind, law, initial } => {
-                    let linear = matches!(law, StoreLaw::Linear(value) if !is_modulated(value));
-                    (*kind, !matches!(initial, StoreInitial::Unstated), linear)
+/// Ports of storages: those with a stated initial value, then those with a non-linear law, then the others.
+fn by_preference(graph: &BondGraph) -> Vec<(End, Storage)> {
+    let mut storages: Vec<(bool, bool, End, Storage)> = graph
+        .stores()
+        .map(|(end, kind)| {
+            let (stated, linear) = match graph.law_at(end) {
+                Law::Store { law, initial, .. } => {
+                    (!matches!(initial, StoreInitial::Unstated), is_linear(graph, end, law))
                 }
-                Law::Rate { kind, initial, .. } => {
-                    (*kind, matches!(initial, Initial::Given(_)), false)
-                }
-                _ => return None,
+                Law::Rate { initial, .. } => (matches!(initial, Initial::Given(_)), false),
+                _ => (false, false),
             };
-            Some((!stated, linear, id, kind))
+            (!stated, linear, end, kind)
         })
         .collect();
-    storages.sort_by_key(|&(unstated, linear, id, _)| (unstated, linear, id));
-    storages.into_iter().map(|(_, _, id, kind)| (id, kind)).collect()
+    storages.sort_by_key(|&(unstated, linear, end, _)| (unstated, linear, end));
+    storages.into_iter().map(|(_, _, end, kind)| (end, kind)).collect()
+}
+
+fn is_linear(graph: &BondGraph, end: End, law: &StoreLaw) -> bool {
+    match (&graph.vertex(end.vertex).law, law) {
+        (Law::Field(Field { matrix: Some(rows), .. }), _) => {
+            !rows.iter().flatten().any(is_modulated)
+        }
+        (_, StoreLaw::Linear(value)) => !is_modulated(value),
+        _ => false,
+    }
 }
 
 /// All that may be chosen, in SCAP's order.
 fn wishes(graph: &BondGraph) -> Vec<Wish> {
     let mut wishes = Vec::new();
-    let one_port = |wishes: &mut Vec<Wish>, vertex: VertexId, receives_effort: bool| {
-        if let Some(&bond) = graph.vertex(vertex).bonds.first() {
-            let end = End { vertex, port: 0 };
+    let at_port = |wishes: &mut Vec<Wish>, end: End, receives_effort: bool| {
+        if let Some(bond) = graph.bond_at(end) {
             wishes.push(Wish { bond, stroke: stroke_for(graph, bond, end, receives_effort) });
         }
     };
@@ -147,19 +153,15 @@ fn wishes(graph: &BondGraph) -> Vec<Wish> {
             wishes.push(Wish { bond, stroke: stroke_for(graph, bond, end, receives) });
         }
     }
-    for (id, kind) in by_preference(graph) {
-        one_port(&mut wishes, id, kind.integrates() == Power::Effort);
+    for (end, kind) in by_preference(graph) {
+        at_port(&mut wishes, end, kind.integrates() == Power::Effort);
     }
     for written in [true, false] {
-        for id in graph.vertex_ids() {
-            if let Law::Dissipator(law) = &graph.vertex(id).law {
-                let receives = match law {
-                    Dissipation::Effort(_) => false,
-                    Dissipation::Flow(_) => true,
-                    Dissipation::Linear(_) => false,
-                };
-                if written != matches!(law, Dissipation::Linear(_)) {
-                    one_port(&mut wishes, id, receives);
+        for end in graph.vertex_ids().flat_map(|id| graph.law_ports(id)) {
+            if let Law::Dissipator(law) = graph.law_at(end) {
+                let receives = matches!(law, Dissipation::Flow(_));
+                if written == is_written(graph, end, law) {
+                    at_port(&mut wishes, end, receives);
                 }
             }
         }
@@ -167,6 +169,13 @@ fn wishes(graph: &BondGraph) -> Vec<Wish> {
     // What is left are bonds between junctions and two-ports that nothing decides.
     wishes.extend(graph.bond_ids().map(|bond| Wish { bond, stroke: Stroke::AtTo }));
     wishes
+}
+
+/// Whether a dissipator's law says which variable it gives; resistances, and fields of them, serve either way.
+pub fn is_written(graph: &BondGraph, end: End, law: &Dissipation) -> bool {
+    let field =
+        matches!(&graph.vertex(end.vertex).law, Law::Field(field) if field.matrix.is_some());
+    !field && !matches!(law, Dissipation::Linear(_))
 }
 
 /// Whether a modulated two-port receives the effort at port 1 where nothing is divided by its modulus; `None` for others.

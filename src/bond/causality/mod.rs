@@ -22,8 +22,8 @@ use crate::diagnostic::{Diagnostic, has_errors};
 pub struct Causality {
     /// The stroke of each bond, by [`BondId`]; `None` where a conflict left it open, and round a ring of equal junctions.
     pub strokes: Vec<Option<Stroke>>,
-    /// Storages in integral causality, in the order in which they were assigned.
-    pub states: Vec<VertexId>,
+    /// Ports of storages in integral causality, in the order in which they were assigned.
+    pub states: Vec<End>,
     /// Storages in derivative causality.
     pub dependent: Vec<Dependent>,
     /// Algebraic loops, each as a causal path.
@@ -37,10 +37,10 @@ pub struct Causality {
 /// A storage that others determine.
 #[derive(Clone, Debug)]
 pub struct Dependent {
-    /// The storage.
-    pub storage: VertexId,
+    /// The storage, at its port.
+    pub storage: End,
     /// What determines it (storages in integral causality or sources), the nearest first.
-    pub on: Vec<VertexId>,
+    pub on: Vec<End>,
     /// The causal path from the first of them to the storage.
     pub path: Vec<BondId>,
 }
@@ -112,14 +112,8 @@ fn is_modulated(expr: &Expr) -> bool {
     varies
 }
 
-/// Whether the storage's own causality is integral: it receives what it integrates.
-fn is_integral(
-    graph: &BondGraph,
-    causality: &Causality,
-    storage: VertexId,
-    kind: Storage,
-) -> Option<bool> {
-    let bond = *graph.vertex(storage).bonds.first()?;
-    let receives = causality.receives_effort(graph, bond, End { vertex: storage, port: 0 })?;
+/// Whether the causality at a storage's port is integral: it receives what it integrates.
+fn is_integral(graph: &BondGraph, causality: &Causality, end: End, kind: Storage) -> Option<bool> {
+    let receives = causality.receives_effort(graph, graph.bond_at(end)?, end)?;
     Some(receives == (kind.integrates() == Power::Effort))
 }

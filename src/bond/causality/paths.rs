@@ -100,7 +100,7 @@ fn set_by(
     from: &mut Vec<u32>,
 ) {
     let vertex = graph.vertex(end.vertex);
-    match &vertex.law {
+    match graph.law_at(end) {
         Law::Zero | Law::One => {
             if common(&vertex.law) == Some(power) {
                 from.extend(brings.map(|other| number(other, power)));
@@ -113,14 +113,41 @@ fn set_by(
         Law::Dissipator(law) => {
             let (Dissipation::Linear(expr) | Dissipation::Effort(expr) | Dissipation::Flow(expr)) =
                 law;
-            from.push(number(bond, power.dual()));
-            read(graph, causality, expr, from);
+            let as_written = match law {
+                Dissipation::Linear(_) => false,
+                Dissipation::Effort(_) => power == Power::Effort,
+                Dissipation::Flow(_) => power == Power::Flow,
+            };
+            let other = |leaf: &Leaf| !is_own(vertex, leaf);
+            match vertex.law {
+                // A field's law names its own variables; inverted it follows from all that is imposed on the field.
+                Law::Field(_) if as_written => read(graph, causality, expr, from),
+                Law::Field(_) => {
+                    for port in graph.law_ports(end.vertex) {
+                        imposed(graph, causality, port, from);
+                    }
+                    read_if(graph, causality, expr, &other, from);
+                }
+                _ => {
+                    from.push(number(bond, power.dual()));
+                    read(graph, causality, expr, from);
+                }
+            }
         }
         Law::Store { kind, law, .. } => {
-            if is_integral(graph, causality, end.vertex, *kind) == Some(true) {
+            if is_integral(graph, causality, end, *kind) == Some(true) {
                 let (StoreLaw::Linear(expr) | StoreLaw::OfStored(expr) | StoreLaw::OfPower(expr)) =
                     law;
-                read(graph, causality, expr, from);
+                if matches!((&vertex.law, law), (Law::Field(_), StoreLaw::OfPower(_))) {
+                    // A matrix is inverted over the ports in integral causality; what it speaks of besides its own
+                    // variables is read.
+                    for port in graph.law_ports(end.vertex) {
+                        dependent_power(graph, causality, port, from);
+                    }
+                    read_if(graph, causality, expr, &|leaf| !is_own(vertex, leaf), from);
+                } else {
+                    read(graph, causality, expr, from);
+                }
             }
         }
         Law::Rate { .. } => {}
@@ -132,25 +159,52 @@ fn set_by(
             let (Modulus::Ratio(expr) | Modulus::Gain(expr)) = modulus;
             read(graph, causality, expr, from);
         }
+        // A field's ports have laws of their own.
+        Law::Field(_) => {}
+    }
+}
+
+/// Whether a leaf is an effort or flow of the element's own bonds.
+fn is_own(vertex: &Vertex, leaf: &Leaf) -> bool {
+    matches!(leaf, Leaf::Bond { bond, .. } if vertex.bonds.contains(bond))
+}
+
+/// What the other end imposes on a port.
+fn imposed(graph: &BondGraph, causality: &Causality, end: End, from: &mut Vec<u32>) {
+    if let Some(bond) = graph.bond_at(end)
+        && let Some(receives_effort) = causality.receives_effort(graph, bond, end)
+    {
+        from.push(number(bond, if receives_effort { Power::Effort } else { Power::Flow }));
+    }
+}
+
+/// The power variable that determines what a port stores, where it is in derivative causality.
+fn dependent_power(graph: &BondGraph, causality: &Causality, end: End, from: &mut Vec<u32>) {
+    if let (Some(kind), Some(bond)) = (graph.storage(end), graph.bond_at(end))
+        && is_integral(graph, causality, end, kind) == Some(false)
+    {
+        from.push(number(bond, kind.gives()));
     }
 }
 
 /// The variables that an expression reads.
 fn read(graph: &BondGraph, causality: &Causality, expr: &Expr, from: &mut Vec<u32>) {
+    read_if(graph, causality, expr, &|_| true, from);
+}
+
+/// The variables of those leaves of an expression that are wanted.
+fn read_if(
+    graph: &BondGraph,
+    causality: &Causality,
+    expr: &Expr,
+    wanted: &dyn Fn(&Leaf) -> bool,
+    from: &mut Vec<u32>,
+) {
     expr.leaves(&mut |leaf, _| match leaf {
+        leaf if !wanted(leaf) => {}
         Leaf::Bond { bond, variable, .. } => from.push(number(*bond, *variable)),
         Leaf::Signal(signal) => from.push(number_of_signal(graph, *signal)),
-        Leaf::Stored(storage) => {
-            let kind = match &graph.vertex(*storage).law {
-                Law::Store { kind, .. } | Law::Rate { kind, .. } => *kind,
-                _ => return,
-            };
-            if is_integral(graph, causality, *storage, kind) == Some(false)
-                && let Some(&bond) = graph.vertex(*storage).bonds.first()
-            {
-                from.push(number(bond, kind.gives()));
-            }
-        }
+        Leaf::Stored(end) => dependent_power(graph, causality, *end, from),
         // A law's own argument is the caller's to list.
         Leaf::Own(_) | Leaf::Parameter(_) | Leaf::Time => {}
     });
@@ -283,15 +337,11 @@ fn dependent(graph: &BondGraph, causality: &Causality, follows: &Follows) -> Vec
     let mut left = MOST_BONDS;
     let mut reached_from = vec![u32::MAX; follows.starts.len()];
     let mut result = Vec::new();
-    for storage in graph.vertex_ids() {
-        let kind = match &graph.vertex(storage).law {
-            Law::Store { kind, .. } | Law::Rate { kind, .. } => *kind,
-            _ => continue,
-        };
+    for (storage, kind) in graph.stores() {
         if is_integral(graph, causality, storage, kind) != Some(false) {
             continue;
         }
-        let Some(&bond) = graph.vertex(storage).bonds.first() else { continue };
+        let Some(bond) = graph.bond_at(storage) else { continue };
         // Backwards from what is imposed on it.
         let start = number(bond, kind.gives());
         let mut touched = vec![start];
@@ -303,12 +353,12 @@ fn dependent(graph: &BondGraph, causality: &Causality, follows: &Follows) -> Vec
             if (variable as usize) < 2 * graph.bonds.len() {
                 let power = if variable.is_multiple_of(2) { Power::Effort } else { Power::Flow };
                 let end = setter(graph, causality, BondId(variable / 2), power);
-                if let Some(end) = end.filter(|end| determines(graph, causality, end.vertex)) {
+                if let Some(end) = end.filter(|end| determines(graph, causality, *end)) {
                     if on.is_empty() {
                         path = back(&reached_from, variable);
                     }
-                    if !on.contains(&end.vertex) {
-                        on.push(end.vertex);
+                    if !on.contains(&end) {
+                        on.push(end);
                     }
                 }
             }
@@ -332,11 +382,11 @@ fn dependent(graph: &BondGraph, causality: &Causality, follows: &Follows) -> Vec
 }
 
 /// A source, or a storage in integral causality.
-fn determines(graph: &BondGraph, causality: &Causality, vertex: VertexId) -> bool {
-    match &graph.vertex(vertex).law {
+fn determines(graph: &BondGraph, causality: &Causality, end: End) -> bool {
+    match graph.law_at(end) {
         Law::Source { .. } => true,
         Law::Store { kind, .. } | Law::Rate { kind, .. } => {
-            is_integral(graph, causality, vertex, *kind) == Some(true)
+            is_integral(graph, causality, end, *kind) == Some(true)
         }
         _ => false,
     }

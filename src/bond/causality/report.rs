@@ -30,12 +30,10 @@ pub fn explain(
     }
     for id in graph.vertex_ids() {
         let vertex = graph.vertex(id);
-        let Some(&bond) = vertex.bonds.first() else { continue };
-        let Some(receives) = causality.receives_effort(graph, bond, End { vertex: id, port: 0 })
-        else {
-            continue;
-        };
-        if assign::non_dividing(vertex).is_some_and(|wanted| wanted != receives) {
+        let receives = |end: End| causality.receives_effort(graph, graph.bond_at(end)?, end);
+        if let Some(receives) = receives(End::only(id))
+            && assign::non_dividing(vertex).is_some_and(|wanted| wanted != receives)
+        {
             let message = format!(
                 "{} is forced into the causality that divides by its modulus",
                 name(graph, id)
@@ -48,15 +46,22 @@ pub fn explain(
                     .help("let a storage or a resistance stand between it and what forces it"),
             );
         }
-        let other_way = match &vertex.law {
-            Law::Dissipator(Dissipation::Effort(_)) if receives => Some(("e", "f")),
-            Law::Dissipator(Dissipation::Flow(_)) if !receives => Some(("f", "e")),
-            _ => None,
-        };
-        if let Some((gives, takes)) = other_way {
+        for end in graph.law_ports(id) {
+            let (Law::Dissipator(law), Some(receives)) = (graph.law_at(end), receives(end)) else {
+                continue;
+            };
+            let other_way = match law {
+                Dissipation::Effort(_) if receives => ("e", "f"),
+                Dissipation::Flow(_) if !receives => ("f", "e"),
+                _ => continue,
+            };
+            if !assign::is_written(graph, end, law) {
+                continue;
+            }
+            let (gives, takes) = other_way;
             let message = format!(
                 "the law of {} gives {gives} from {takes}, but the graph wants {takes} from {gives}",
-                name(graph, id)
+                port_name(graph, end)
             );
             diagnostics.push(
                 Diagnostic::note("N0401", vertex.span, message)
@@ -64,6 +69,15 @@ pub fn explain(
             );
         }
     }
+}
+
+/// `I:rotor`, `I:coils.1`.
+fn port_name(graph: &BondGraph, end: End) -> String {
+    format!("{}:{}", graph.vertex(end.vertex).kind, graph.port_name(end))
+}
+
+fn port_names(graph: &BondGraph, ends: &[End]) -> String {
+    list(&ends.iter().map(|&end| port_name(graph, end)).collect::<Vec<_>>())
 }
 
 fn name(graph: &BondGraph, id: VertexId) -> String {
@@ -91,7 +105,7 @@ fn path(graph: &BondGraph, bonds: &[BondId]) -> String {
     for &id in bonds {
         let bond = graph.bond(id);
         if last == Some(bond.from.vertex) {
-            let _ = write!(text, " -> {}", graph.vertex(bond.to.vertex).name);
+            let _ = write!(text, " -> {}", graph.end_name(bond.to));
         } else {
             let comma = if text.is_empty() { "" } else { ", " };
             let _ = write!(text, "{comma}{}", graph.bond_name(id));
@@ -235,14 +249,14 @@ fn tell_ring(graph: &BondGraph, ring: &[BondId]) -> Diagnostic {
 }
 
 fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependent) -> Diagnostic {
-    let vertex = graph.vertex(dependent.storage);
+    let vertex = graph.vertex(dependent.storage.vertex);
     let on = &dependent.on[..dependent.on.len().min(MOST)];
     let message = match on {
-        [] => format!("{} is in derivative causality", name(graph, dependent.storage)),
+        [] => format!("{} is in derivative causality", port_name(graph, dependent.storage)),
         on => format!(
             "{} is in derivative causality: {} determine{} it",
-            name(graph, dependent.storage),
-            names(graph, on),
+            port_name(graph, dependent.storage),
+            port_names(graph, on),
             if on.len() == 1 { "s" } else { "" }
         ),
     };
@@ -250,8 +264,8 @@ fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependen
     if !dependent.path.is_empty() {
         diagnostic = diagnostic.because(format!("causal path: {}", path(graph, &dependent.path)));
     }
-    for &id in on {
-        diagnostic = diagnostic.label(graph.vertex(id).span, "");
+    for end in on {
+        diagnostic = diagnostic.label(graph.vertex(end.vertex).span, "");
     }
     let (states, storages) =
         (causality.states.len(), causality.states.len() + causality.dependent.len());
@@ -314,14 +328,14 @@ pub fn to_text(graph: &BondGraph, causality: &Causality) -> String {
             Some(Stroke::AtTo) => "->| ",
             None => "->  ",
         };
-        let (from, to) = (end_name(graph, bond.from), end_name(graph, bond.to));
+        let (from, to) = (graph.port_name(bond.from), graph.port_name(bond.to));
         let _ = writeln!(text, "  {from} {arrow}{to}");
     }
     let integrators: Vec<&Signal> =
         graph.signals.iter().filter(|s| matches!(s.law, SignalLaw::Integrator { .. })).collect();
     let _ = writeln!(text, "\nstates ({})", causality.order);
-    for &id in &causality.states {
-        let _ = writeln!(text, "  {}", name(graph, id));
+    for &end in &causality.states {
+        let _ = writeln!(text, "  {}", port_name(graph, end));
     }
     for signal in &integrators {
         let _ = writeln!(text, "  signal {}", signal.name);
@@ -340,8 +354,8 @@ pub fn to_text(graph: &BondGraph, causality: &Causality) -> String {
         let _ = writeln!(
             text,
             "  {} depends on {}: {}",
-            name(graph, dependent.storage),
-            names(graph, &dependent.on),
+            port_name(graph, dependent.storage),
+            port_names(graph, &dependent.on),
             path(graph, &dependent.path)
         );
     }
@@ -369,26 +383,19 @@ pub fn to_text(graph: &BondGraph, causality: &Causality) -> String {
     text
 }
 
-/// The name of a bond's end as the file would write it: a two-port's with its port.
-fn end_name(graph: &BondGraph, end: End) -> String {
-    let vertex = graph.vertex(end.vertex);
-    match vertex.law {
-        Law::Transformer(_) | Law::Gyrator(_) => format!("{}.{}", vertex.name, end.port + 1),
-        _ => vertex.name.clone(),
-    }
-}
-
 /// The JSON of `bondspice causality --format json`. A bond's `stroke` is `"from"`, `"to"` or null; paths are bonds as
 /// `[from, to]`.
 pub fn to_json(graph: &BondGraph, causality: &Causality) -> Value {
     let vertices = |ids: &[VertexId]| -> Vec<&str> {
         ids.iter().map(|&id| graph.vertex(id).name.as_str()).collect()
     };
-    let bonds = |ids: &[BondId]| -> Vec<[&str; 2]> {
+    let ports =
+        |ends: &[End]| -> Vec<String> { ends.iter().map(|&end| graph.port_name(end)).collect() };
+    let bonds = |ids: &[BondId]| -> Vec<[String; 2]> {
         ids.iter()
             .map(|&id| {
                 let bond = graph.bond(id);
-                [&*graph.vertex(bond.from.vertex).name, &*graph.vertex(bond.to.vertex).name]
+                [graph.end_name(bond.from), graph.end_name(bond.to)]
             })
             .collect()
     };
@@ -401,23 +408,23 @@ pub fn to_json(graph: &BondGraph, causality: &Causality) -> Value {
         .signals
         .iter()
         .filter(|signal| matches!(signal.law, SignalLaw::Integrator { .. }))
-        .map(|signal| signal.name.as_str());
-    let states: Vec<&str> = vertices(&causality.states).into_iter().chain(integrators).collect();
+        .map(|signal| signal.name.clone());
+    let states: Vec<String> = ports(&causality.states).into_iter().chain(integrators).collect();
     json!({
         "schema": 1,
         "bonds": graph.bond_ids().map(|id| {
             let bond = graph.bond(id);
             json!({
-                "from": graph.vertex(bond.from.vertex).name,
-                "to": graph.vertex(bond.to.vertex).name,
+                "from": graph.end_name(bond.from),
+                "to": graph.end_name(bond.to),
                 "stroke": stroke(id),
             })
         }).collect::<Vec<_>>(),
         "states": states,
         "order": causality.order,
         "derivative": causality.dependent.iter().map(|dependent| json!({
-            "storage": graph.vertex(dependent.storage).name,
-            "on": vertices(&dependent.on),
+            "storage": graph.port_name(dependent.storage),
+            "on": ports(&dependent.on),
             "path": bonds(&dependent.path),
         })).collect::<Vec<_>>(),
         "loops": causality.loops.iter().map(|found| json!({

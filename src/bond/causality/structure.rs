@@ -10,6 +10,7 @@ fn bonds_wanted(law: &Law) -> (usize, usize) {
         Law::Zero | Law::One => (2, usize::MAX),
         Law::Transformer(_) | Law::Gyrator(_) => (2, 2),
         Law::Source { .. } | Law::Dissipator(_) | Law::Store { .. } | Law::Rate { .. } => (1, 1),
+        Law::Field(field) => (field.ports.len(), field.ports.len()),
     }
 }
 
@@ -29,6 +30,7 @@ pub fn check(graph: &BondGraph, diagnostics: &mut Vec<Diagnostic>) {
                 Law::Transformer(_) | Law::Gyrator(_) => {
                     ("E0403", "two-port", "a two-port needs a bond at each of its two ports")
                 }
+                Law::Field(_) => ("E0403", "field", "a field needs a bond at each of its ports"),
                 _ => (
                     "E0403",
                     "element",
@@ -44,7 +46,11 @@ pub fn check(graph: &BondGraph, diagnostics: &mut Vec<Diagnostic>) {
                 Diagnostic::error(code, vertex.span, message).help(help),
             ));
         } else if count > most {
-            let what = if most == 1 { "one port" } else { "two ports" };
+            let what = match most {
+                1 => "one port".to_string(),
+                2 => "two ports".to_string(),
+                _ => format!("{most} ports"),
+            };
             let message = format!("{name} has {what} but {count} bonds");
             let help = if most == 1 {
                 "put a 0-junction (common effort) or a 1-junction (common flow) between it and its bonds"
@@ -79,6 +85,10 @@ pub fn check(graph: &BondGraph, diagnostics: &mut Vec<Diagnostic>) {
                     .label(from.span, format!("{}:{} imposes the {what}", from.kind, from.name))
                     .label(to.span, format!("{}:{} imposes the {what}", to.kind, to.name)),
             );
+        }
+        // Several ports of a field may well meet at one junction.
+        if [from, to].iter().any(|vertex| matches!(vertex.law, Law::Field(_))) {
+            continue;
         }
         let key = (bond.from.vertex.min(bond.to.vertex), bond.from.vertex.max(bond.to.vertex));
         if let Some(first) = pairs.insert(key, id) {

@@ -114,6 +114,10 @@ fn names(graph: &BondGraph, ids: &[VertexId]) -> Vec<String> {
     ids.iter().map(|&id| graph.vertex(id).name.clone()).collect()
 }
 
+fn ports(graph: &BondGraph, ends: &[End]) -> Vec<String> {
+    ends.iter().map(|&end| graph.port_name(end)).collect()
+}
+
 fn id(graph: &BondGraph, name: &str) -> VertexId {
     graph.vertex_ids().find(|&id| graph.vertex(id).name == name).unwrap()
 }
@@ -168,7 +172,7 @@ fn bad(text: &str) -> (BondGraph, Causality, Vec<Diagnostic>) {
 #[test]
 fn series_circuit() {
     let (graph, causality, diagnostics) = good("Se:U -> 1:mesh\nmesh -> I:L, R:R, C:C");
-    assert_eq!(names(&graph, &causality.states), ["L", "C"]);
+    assert_eq!(ports(&graph, &causality.states), ["L", "C"]);
     assert_eq!((causality.order, diagnostics.len()), (2, 0));
     insta::assert_snapshot!(to_text(&graph, &causality), @r"
     bonds (the stroke is at the end on which the effort is imposed)
@@ -207,7 +211,7 @@ fn states_of_textbook_cases() {
         ("0:j -> C:C(law), I:I", vec!["C", "I"]),
     ] {
         let (graph, causality, diagnostics) = good(text);
-        assert_eq!(names(&graph, &causality.states), states, "{text}");
+        assert_eq!(ports(&graph, &causality.states), states, "{text}");
         assert!(codes(&diagnostics).iter().all(|&code| code == "W0402"), "{text}");
     }
 }
@@ -217,11 +221,11 @@ fn dependent_storages_name_what_determines_them() {
     // Two inertias on a rigid gear.
     let (graph, causality, diagnostics) =
         good("Se:T -> 1:s1\ns1 -> I:J1, R:b1\ns1 -> TF:gear -> 1:s2\ns2 -> I:J2, R:b2, C:k");
-    assert_eq!(names(&graph, &causality.states), ["J1", "k"]);
+    assert_eq!(ports(&graph, &causality.states), ["J1", "k"]);
     assert_eq!(causality.order, 2);
     let [dependent] = &causality.dependent[..] else { panic!() };
-    assert_eq!(graph.vertex(dependent.storage).name, "J2");
-    assert_eq!(names(&graph, &dependent.on), ["J1"]);
+    assert_eq!(graph.port_name(dependent.storage), "J2");
+    assert_eq!(ports(&graph, &dependent.on), ["J1"]);
     let path: Vec<String> = dependent.path.iter().map(|&bond| graph.bond_name(bond)).collect();
     assert_eq!(path, ["s1 -> J1", "s1 -> gear", "gear -> s2", "s2 -> J2"]);
     assert_eq!(codes(&diagnostics), ["W0401"]);
@@ -229,22 +233,22 @@ fn dependent_storages_name_what_determines_them() {
     // Through a gyrator: an inertia and a compliance.
     let (graph, causality, _) =
         good("Se:S -> 1:a\na -> I:I, R:Ra\na -> GY:g -> 0:b\nb -> C:C\nb -> 1:c\nc -> I:J, R:Rc");
-    assert_eq!(names(&graph, &causality.states), ["I", "J"]);
-    assert_eq!(names(&graph, &causality.dependent[0].on), ["I"]);
+    assert_eq!(ports(&graph, &causality.states), ["I", "J"]);
+    assert_eq!(ports(&graph, &causality.dependent[0].on), ["I"]);
     // Two compliances in parallel; the one with a stated value is the state.
     let (graph, causality, _) = good("Se:S -> 1:a\na -> R:R\na -> 0:b\nb -> C:C1, C:C2(0)");
-    assert_eq!(names(&graph, &causality.states), ["C2"]);
-    assert_eq!(names(&graph, &causality.dependent[0].on), ["C2"]);
+    assert_eq!(ports(&graph, &causality.states), ["C2"]);
+    assert_eq!(ports(&graph, &causality.dependent[0].on), ["C2"]);
     // A compliance on a source depends on the source.
     let (graph, causality, _) = good("Se:S -> 0:a\na -> C:C, R:R");
     assert!(causality.states.is_empty());
-    assert_eq!(names(&graph, &causality.dependent[0].on), ["S"]);
+    assert_eq!(ports(&graph, &causality.dependent[0].on), ["S"]);
 }
 
 #[test]
 fn nonlinear_storages_come_before_linear_ones() {
     let (graph, causality, _) = good("0:j -> C:linear, C:law(law), R:R");
-    assert_eq!(names(&graph, &causality.states), ["law"]);
+    assert_eq!(ports(&graph, &causality.states), ["law"]);
 }
 
 #[test]
@@ -286,7 +290,7 @@ fn the_actuator_has_one_loop() {
          surface -> I:J
          Se:aero -> surface",
     );
-    assert_eq!(names(&graph, &causality.states), ["L", "Jmp", "fluid", "Mj", "stiffness", "J"]);
+    assert_eq!(ports(&graph, &causality.states), ["L", "Jmp", "fluid", "Mj", "stiffness", "J"]);
     assert_eq!(causality.loops.len(), 1);
     assert_eq!(names(&graph, &causality.loops[0].elements), ["Clp", "line_loss", "dilatation"]);
     let mut path: Vec<String> =
@@ -320,7 +324,7 @@ fn bridge_with_a_loop_of_junctions() {
     let (graph, causality, _) = good(
         "Se:V -> 0:a -> 1:ab -> 0:b -> 1:bc -> 0:c\nab -> R:R1\nb -> C:C\nbc -> R:R5\nc -> R:R4\na -> 1:ac -> c\nac -> I:L, R:RL",
     );
-    assert_eq!(names(&graph, &causality.states), ["C", "L"]);
+    assert_eq!(ports(&graph, &causality.states), ["C", "L"]);
     assert_eq!(names(&graph, &causality.loops[0].elements), ["R5", "R4"]);
 }
 
@@ -386,7 +390,7 @@ fn structure_is_checked_first() {
 fn given_strokes_are_obeyed_and_checked() {
     let (graph, causality, diagnostics) = good("Se:U -> 1:m\nm |-> I:L\nm -> R:R");
     assert!(causality.states.is_empty());
-    assert_eq!(names(&graph, &[causality.dependent[0].storage]), ["L"]);
+    assert_eq!(ports(&graph, &[causality.dependent[0].storage]), ["L"]);
     assert_eq!(codes(&diagnostics)[0], "W0401");
     let (_, causality, diagnostics) = bad("Se:U |-> 1:m\nm -> I:L\nm -> R:R");
     assert_eq!(codes(&diagnostics), ["E0407"]);

@@ -1,7 +1,8 @@
 //! The law of each element, from its arguments.
 
+use super::fields;
 use super::scope::{Declaration, Meaning, Scope, a, did_you_mean};
-use super::value::{Place, varies};
+use super::value::{Own, Place, varies};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Argument, Label, Value};
@@ -9,20 +10,17 @@ use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Expr as Tree, Node};
 use crate::quantity::nearest;
 
-/// An own variable and the name that a law calls it by.
-type Own = (&'static str, Variable);
-
-const EFFORT: Own = ("e", Variable::Power(Power::Effort));
-const FLOW: Own = ("f", Variable::Power(Power::Flow));
-const CHARGE: Own = ("q", Variable::Stored);
-const MOMENTUM: Own = ("p", Variable::Stored);
+const EFFORT: Own<'static> = ("e", Leaf::Own(Variable::Power(Power::Effort)));
+const FLOW: Own<'static> = ("f", Leaf::Own(Variable::Power(Power::Flow)));
+const CHARGE: Own<'static> = ("q", Leaf::Own(Variable::Stored));
+const MOMENTUM: Own<'static> = ("p", Leaf::Own(Variable::Stored));
 
 /// A form that a law may have: what stands before `=`, and over which own variables.
 struct Form {
     shape: Shape,
     label: &'static str,
     derivative: bool,
-    own: &'static [Own],
+    own: &'static [Own<'static>],
     make: fn(Expr) -> Made,
 }
 
@@ -39,7 +37,7 @@ const fn form(
     shape: Shape,
     label: &'static str,
     derivative: bool,
-    own: &'static [Own],
+    own: &'static [Own<'static>],
     make: fn(Expr) -> Made,
 ) -> Form {
     Form { shape, label, derivative, own, make }
@@ -83,8 +81,11 @@ impl Scope<'_> {
         for k in 0..self.declarations.len() {
             let declaration = self.declarations[k];
             let name = self.graph.vertices[k].name.clone();
-            if let Some(law) = self.at(declaration.here, |scope| scope.law(&declaration, &name, d))
-            {
+            let law = self.at(declaration.here, |scope| match fields::ports(&declaration) {
+                Some(ports) => scope.field_law(VertexId(k as u32), &declaration, &name, ports, d),
+                None => scope.law(&declaration, &name, d),
+            });
+            if let Some(law) = law {
                 self.graph.vertices[k].law = law;
             }
         }
@@ -245,11 +246,13 @@ impl Scope<'_> {
             let Argument { label, value, span } = argument;
             let Value::Expr(value) = value else {
                 d.push(match value {
-                    Value::Matrix(_) => {
-                        Diagnostic::error("E0201", *span, "fields are not part of the language yet")
-                            .says("a matrix")
-                            .help("give each port an element of its own")
-                    }
+                    Value::Matrix(_) => Diagnostic::error(
+                        "E0209",
+                        *span,
+                        format!("{} takes no matrix", a(declaration.element.noun)),
+                    )
+                    .says("only R, C and I do")
+                    .help(usage(shape)),
                     _ => Diagnostic::error("E0209", *span, "a text is no value")
                         .says("expected an expression"),
                 });
@@ -309,18 +312,6 @@ impl Scope<'_> {
         let shape = declaration.element.shape;
         let name = label.name.text.as_str();
         let written = if label.derivative { format!("der({name})") } else { name.to_string() };
-        let numbered = name.len() == 2
-            && name.starts_with(['e', 'f', 'q', 'p'])
-            && name.ends_with(|c: char| c.is_ascii_digit() && c != '0');
-        if numbered {
-            return Diagnostic::error(
-                "E0201",
-                label.span,
-                "fields are not part of the language yet",
-            )
-            .says("a law with a number")
-            .help("give each port an element of its own");
-        }
         let error = Diagnostic::error(
             "E0209",
             label.span,

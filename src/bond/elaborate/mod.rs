@@ -19,6 +19,7 @@ mod tables;
 mod signals;
 mod regulators;
 mod laws;
+mod fields;
 mod dimensions;
 mod domains;
 mod experiment;
@@ -82,6 +83,9 @@ pub fn elaborate(
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
     scope.set_experiment(overrides, d);
+    if !has_errors(&d[before..]) {
+        crate::bond::fields::check(&scope.graph, d);
+    }
     merge_repeats(d, before);
     (!has_errors(d)).then_some(scope.graph)
 }

@@ -200,10 +200,8 @@ impl Scope<'_> {
                 }
             }
         }
-        for id in self.graph.vertex_ids() {
-            if let Some(column) = stored_column(&self.graph, id) {
-                add(column);
-            }
+        for (end, _) in self.graph.stores() {
+            stored_column(&self.graph, end).into_iter().for_each(&mut add);
         }
         columns
     }
@@ -232,16 +230,19 @@ pub fn observables(graph: &BondGraph) -> Vec<Observation> {
                     }
                 }
             }
-            (law, [bond, ..]) => {
+            (law, [_, ..]) => {
                 let along = matches!(law, Law::Source { detector: false, .. });
-                let negated = !along && graph.bond(*bond).from.vertex == id;
-                for what in ["e", "f", "power"] {
-                    add(&vertex.name, what, *bond, negated);
+                for end in graph.law_ports(id) {
+                    let Some(bond) = graph.bond_at(end) else { continue };
+                    let negated = !along && graph.bond(bond).from == end;
+                    for what in ["e", "f", "power"] {
+                        add(&graph.end_name(end), what, bond, negated);
+                    }
                 }
             }
             _ => {}
         }
-        columns.extend(stored_column(graph, id));
+        columns.extend(graph.law_ports(id).filter_map(|end| stored_column(graph, end)));
     }
     columns
 }
@@ -265,13 +266,11 @@ fn bond_column(
     Observation { name: format!("{what}({element})"), expr, unit: (String::new(), 1.0), si_unit }
 }
 
-fn stored_column(graph: &BondGraph, id: VertexId) -> Option<Observation> {
-    let vertex = graph.vertex(id);
-    let (Law::Store { kind, .. } | Law::Rate { kind, .. }) = &vertex.law else { return None };
-    let what = if *kind == Storage::Compliance { "q" } else { "p" };
-    let expr = Tree::leaf(Leaf::Stored(id));
+fn stored_column(graph: &BondGraph, end: End) -> Option<Observation> {
+    let what = if graph.storage(end)? == Storage::Compliance { "q" } else { "p" };
+    let expr = Tree::leaf(Leaf::Stored(end));
     let si_unit = unit_of(graph, &expr);
-    let name = format!("{what}({})", vertex.name);
+    let name = format!("{what}({})", graph.end_name(end));
     Some(Observation { name, expr, unit: (String::new(), 1.0), si_unit })
 }
 
@@ -287,16 +286,12 @@ fn unit_of(graph: &BondGraph, expr: &Expr) -> String {
             let text = if *variable == Power::Effort { row.effort } else { row.flow };
             text.to_string()
         }
-        Node::Leaf(Leaf::Stored(id)) => {
-            let vertex = graph.vertex(*id);
-            let row =
-                vertex.bonds.first().map_or(Domain::Any, |bond| graph.bond(*bond).domain).row();
-            let (Law::Store { kind, .. } | Law::Rate { kind, .. }) = &vertex.law else {
-                return String::new();
-            };
-            match kind {
-                Storage::Compliance => row.displacement.to_string(),
-                Storage::Inertia => row.momentum.to_string(),
+        Node::Leaf(Leaf::Stored(end)) => {
+            let row = graph.bond_at(*end).map_or(Domain::Any, |bond| graph.bond(bond).domain).row();
+            match graph.storage(*end) {
+                Some(Storage::Compliance) => row.displacement.to_string(),
+                Some(Storage::Inertia) => row.momentum.to_string(),
+                None => String::new(),
             }
         }
         Node::Binary(crate::expr::Binary::Multiply, a, b) => {

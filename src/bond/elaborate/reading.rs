@@ -1,5 +1,6 @@
 //! Readings: e(x), f(x), q(x), p(x), power(x), and e(a -> b), f(a -> b), power(a -> b).
 
+use super::fields;
 use super::frames::{Found, FrameId, PortId, Thing};
 use super::scope::{Scope, a};
 use crate::bond::elements::Shape;
@@ -78,15 +79,28 @@ impl Scope<'_> {
                 .says("cannot be read")
                 .label(declaration.span, format!("`{name}` is {}", a(noun)))
         };
+        let field = fields::ports(&declaration);
+        if port.is_none() && field.is_some_and(|ports| ports > 1) {
+            let ports = fields::listed(name, field.unwrap_or(0));
+            d.push(
+                wrong(format!("`{name}` has {} ports, which one?", field.unwrap_or(0)))
+                    .help(format!("its ports are {ports}")),
+            );
+            return None;
+        }
         if matches!(what, "q" | "p") {
-            let stored = if what == "q" { Shape::Compliance } else { Shape::Inertia };
-            if shape == stored {
-                return Some(self.stored(id, span));
+            let wanted = if what == "q" { Storage::Compliance } else { Storage::Inertia };
+            let port = port.unwrap_or(0);
+            if fields::storage(&declaration, port) == Some(wanted) {
+                return Some(self.stored(End { vertex: id, port }, span));
             }
             let error = wrong(format!("{} stores no `{what}`", a(noun)));
             d.push(match shape {
                 Shape::Compliance => error.help(format!("a compliance stores q: `q({name})`")),
                 Shape::Inertia => error.help(format!("an inertia stores p: `p({name})`")),
+                Shape::Mixed => error.help(
+                    "a port of an IC field stores q where its law gives e, p where it gives f",
+                ),
                 _ => error.help(format!(
                     "integrate {} in a signal: `integ({}({name}))`",
                     if what == "q" { "the flow" } else { "the effort" },
@@ -137,7 +151,8 @@ impl Scope<'_> {
         let into = !shape.is_junction()
             && !shape.is_two_port()
             && !matches!(shape, Shape::EffortSource | Shape::FlowSource);
-        let negated = into && self.graph.bond(bond).from.vertex == id;
+        let own = End { vertex: id, port: port.unwrap_or(0) };
+        let negated = into && self.graph.bond(bond).from == own;
         Some(variable(what, bond, negated, span))
     }
 
@@ -186,8 +201,8 @@ impl Scope<'_> {
     }
 
     /// q of a compliance, p of an inertia. In rate form the charge is counted from the start, on top of what is given.
-    fn stored(&self, id: VertexId, span: Span) -> Expr {
-        Tree::new(Node::Leaf(Leaf::Stored(id)), span)
+    fn stored(&self, end: End, span: Span) -> Expr {
+        Tree::new(Node::Leaf(Leaf::Stored(end)), span)
     }
 
     fn bond_reading(

@@ -296,7 +296,7 @@ impl Scope<'_> {
         for id in &mut graph.experiment.undriven {
             *id = place[id.index()];
         }
-        let renumber = |expr: &mut Expr| {
+        let mut renumber = |expr: &mut Expr| {
             *expr = expr.map(&mut |leaf, span| {
                 let leaf = match leaf {
                     Leaf::Signal(id) => Leaf::Signal(place[id.index()]),
@@ -317,23 +317,6 @@ impl Scope<'_> {
                 SignalLaw::Waveform(_) => {}
             }
         }
-        for vertex in &mut graph.vertices {
-            match &mut vertex.law {
-                Law::Zero | Law::One => {}
-                Law::Source { value, .. } => renumber(value),
-                Law::Dissipator(
-                    Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
-                ) => renumber(law),
-                Law::Store { law, .. } => match law {
-                    StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
-                        renumber(law);
-                    }
-                },
-                Law::Rate { rate, .. } => renumber(rate),
-                Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
-                    Modulus::Ratio(law) | Modulus::Gain(law) => renumber(law),
-                },
-            }
-        }
+        graph.vertices.iter_mut().for_each(|vertex| vertex.law.expressions_mut(&mut renumber));
     }
 }

@@ -1,6 +1,7 @@
 //! Bonds: which ports they join, and whether every port has what it needs.
 
 use super::expand::list;
+use super::fields;
 use super::frames::{Found, FrameId, Here, PortId, Thing};
 use super::scope::{Scope, a, did_you_mean};
 use crate::bond::graph::*;
@@ -502,17 +503,35 @@ impl<'a> Scope<'a> {
         let (name, noun) = (self.shown(vertex), declaration.element.noun);
         let span = rest.iter().fold(member.span, |span, member| span.join(member.span));
         let two_port = declaration.element.shape.is_two_port();
+        let field = fields::ports(&declaration);
+        if let (Some(ports), [_]) = (field, rest) {
+            let number = member.text.parse::<usize>().ok().filter(|k| (1..=ports).contains(k));
+            if let Some(number) = number.filter(|_| !member.text.starts_with('0')) {
+                return Some(Some(number as u32 - 1));
+            }
+        }
         match member.text.as_str() {
             "1" if two_port && rest.len() == 1 => return Some(Some(0)),
             "2" if two_port && rest.len() == 1 => return Some(Some(1)),
             _ => {}
         }
-        let error =
-            Diagnostic::error("E0410", span, format!("`{name}` has no port `{}`", member.text))
-                .says("no such port")
-                .label(declaration.span, format!("`{name}` is {}", a(noun)));
+        let message = match field.filter(|ports| *ports > 0) {
+            Some(ports) => {
+                let plural = if ports == 1 { "" } else { "s" };
+                format!(
+                    "the field `{name}` has {ports} port{plural}, and none is `{}`",
+                    member.text
+                )
+            }
+            None => format!("`{name}` has no port `{}`", member.text),
+        };
+        let error = Diagnostic::error("E0410", span, message)
+            .says("no such port")
+            .label(declaration.span, format!("`{name}` is {}", a(noun)));
         d.push(if two_port {
             error.help(format!("the ports of {} are `{name}.1` and `{name}.2`", a(noun)))
+        } else if let Some(ports) = field.filter(|ports| *ports > 0) {
+            error.help(format!("the ports of this field are {}", fields::listed(name, ports)))
         } else {
             error.help(format!("the ports of {} have no names: write `{name}`", a(noun)))
         });
@@ -532,6 +551,9 @@ impl<'a> Scope<'a> {
         let bonds: Vec<BondId> = joined.iter().map(|(bond, ..)| *bond).collect();
         if shape.is_two_port() {
             return self.give_two_ports(id, joined, whole, d);
+        }
+        if let Some(ports) = fields::ports(&declaration) {
+            return self.give_field_ports(id, joined, ports, whole, d);
         }
         let least = if shape.is_junction() { 2 } else { 1 };
         if bonds.len() < least && whole {
@@ -660,6 +682,78 @@ impl<'a> Scope<'a> {
             let bond = &mut self.graph.bonds[bond.index()];
             let end = if *head { &mut bond.to } else { &mut bond.from };
             end.port = port;
+        }
+        self.graph.vertices[id.index()].bonds =
+            ports.iter().flatten().map(|(bond, ..)| *bond).collect();
+    }
+
+    /// Ports as named; the only port of a field of one needs no name.
+    fn give_field_ports(
+        &mut self,
+        id: VertexId,
+        joined: &[Joined],
+        count: usize,
+        whole: bool,
+        d: &mut Vec<Diagnostic>,
+    ) {
+        let declaration = self.declarations[id.index()];
+        let name = self.shown(id).to_string();
+        if count == 0 {
+            // Nothing says what its ports are: that is said where its law is made.
+            return;
+        }
+        let mut ports: Vec<Option<Joined>> = vec![None; count];
+        let mut unnamed = vec![];
+        for join in joined {
+            let Some(port) = join.2.named.or((count == 1).then_some(0)) else {
+                unnamed.push(join.2);
+                continue;
+            };
+            let Some(slot) = ports.get_mut(port as usize) else { continue };
+            let Some((.., first)) = slot.replace(*join) else { continue };
+            d.push(
+                Diagnostic::error(
+                    "E0409",
+                    join.2.span,
+                    format!("port {} of the field `{name}` has two bonds", port + 1),
+                )
+                .says("joined again here")
+                .label(first.span, "first joined here")
+                .help("join both to a junction, and the junction to the port"),
+            );
+        }
+        let free: Vec<usize> = (0..count).filter(|port| ports[*port].is_none()).collect();
+        for joint in &unnamed {
+            let mut error = Diagnostic::error(
+                "E0409",
+                joint.span,
+                format!("at which port does this bond join the field `{name}`?"),
+            )
+            .says("no port is named")
+            .help(format!("its ports are {}", fields::listed(&name, count)));
+            // An element declared in place keeps its kind: only plain names can be edited for certain.
+            let plain = declaration.span.join(joint.span) != declaration.span;
+            if let ([port], [_], true) = (free.as_slice(), unnamed.as_slice(), plain) {
+                let written = format!("{name}.{}", port + 1);
+                error = error.fix("name the port that is free", vec![(joint.span, written)]);
+            }
+            d.push(error);
+        }
+        if whole && unnamed.is_empty() {
+            for port in free {
+                d.push(
+                    Diagnostic::error(
+                        "E0403",
+                        declaration.span,
+                        format!("port {} of the field `{name}` has no bond", port + 1),
+                    )
+                    .says(format!("it has {count} {}", if count == 1 { "port" } else { "ports" }))
+                    .help(format!(
+                        "join it, as in `… -> {name}.{0}`; a port at which nothing flows takes `Sf:free(0)`",
+                        port + 1
+                    )),
+                );
+            }
         }
         self.graph.vertices[id.index()].bonds =
             ports.iter().flatten().map(|(bond, ..)| *bond).collect();

@@ -110,7 +110,7 @@ fn spell(graph: &BondGraph, expr: &Expr) -> String {
             if *variable == Power::Effort { "e" } else { "f" },
             graph.bond_name(*bond)
         ),
-        Node::Leaf(Leaf::Stored(id)) => format!("stored({})", graph.vertex(*id).name),
+        Node::Leaf(Leaf::Stored(end)) => format!("stored({})", graph.port_name(*end)),
         Node::Unary(_, a) => format!("-{}", spell(graph, a)),
         Node::Binary(op, a, b) => {
             let sign = match op {
@@ -135,8 +135,12 @@ fn spell(graph: &BondGraph, expr: &Expr) -> String {
 }
 
 fn law_of(graph: &BondGraph, name: &str) -> String {
+    law_text(graph, &vertex(graph, name).law)
+}
+
+fn law_text(graph: &BondGraph, law: &Law) -> String {
     let spell = |expr| spell(graph, expr);
-    match &vertex(graph, name).law {
+    match law {
         Law::Zero => "zero".into(),
         Law::One => "one".into(),
         Law::Source { sets, value, detector } => {
@@ -169,6 +173,10 @@ fn law_of(graph: &BondGraph, name: &str) -> String {
         Law::Transformer(Modulus::Gain(g)) => format!("TF gain {}", spell(g)),
         Law::Gyrator(Modulus::Ratio(r)) => format!("GY ratio {}", spell(r)),
         Law::Gyrator(Modulus::Gain(g)) => format!("GY gain {}", spell(g)),
+        Law::Field(field) => {
+            let ports: Vec<String> = field.ports.iter().map(|law| law_text(graph, law)).collect();
+            ports.join("; ")
+        }
     }
 }
 
@@ -692,8 +700,8 @@ fn values() {
     errors("Se:U(1) -> R:r(e = e)", &["E0217 e"]);
     errors("Se:U(1) -> R:r(1 + f^2)", &["E0217 f"]);
     errors("Se:U(2*f) -> R:r(1)", &["E0217 f"]);
-    errors("Se:U(1) -> R:r([1, 2; 2, 3])", &["E0201 [1, 2; 2, 3]"]);
-    errors("Se:U(1) -> R:r(e1 = 1)", &["E0201 e1"]);
+    errors("Se:U(1) -> R:r([1, 2; 2, 3])", &["E0409 r"]);
+    errors("IC:U(1) -> R:r(1)", &["E0209 1"]);
     errors("Se:U(1) -> 1:m(3) -> R:r(1)", &["E0209 3"]);
     errors("Se:U(1) -> C:c(der(e) = f, q0 = 1)", &["E0209 1"]);
     errors("Se:U(1) -> TF:t(gian = 2) -> R:r(1)", &["E0209 gian"]);

@@ -1,5 +1,6 @@
 //! Expressions: from names to what they mean.
 
+use super::fields::numbered;
 use super::frames::{FrameId, Round, Thing};
 use super::scope::{Meaning, RESERVED, Scope, a, did_you_mean};
 use crate::bond::graph::*;
@@ -9,13 +10,16 @@ use crate::expr::{Expr as Tree, Node, Unary};
 use crate::quantity::nearest;
 use crate::source::Span;
 
+/// An own variable of an element: the name that a law calls it by, and what it is.
+pub(super) type Own<'p> = (&'p str, Leaf);
+
 /// What an expression may speak of, by where it stands.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'p> {
     /// What it is the value of, when only parameters may stand in it: `a parameter`.
     pub constant: Option<&'static str>,
     /// The element's own variables that it may use.
-    pub own: &'static [(&'static str, Variable)],
+    pub own: &'p [Own<'p>],
     /// What to do instead of using another own variable.
     pub own_help: &'p str,
     /// Whom hidden signals belong to, and the statement; `None` where no function with memory can stand.
@@ -43,7 +47,7 @@ impl<'p> Place<'p> {
 
     /// A law over own variables.
     pub fn law(
-        own: &'static [(&'static str, Variable)],
+        own: &'p [Own<'p>],
         own_help: &'p str,
         owner: &'p str,
         statement: usize,
@@ -112,6 +116,10 @@ impl Scope<'_> {
             return Some(Expr::new(Node::Number(value as f64), span));
         }
         let leaf = |leaf| Some(Expr::new(Node::Leaf(leaf), span));
+        if let Some((_, own)) = place.own.iter().find(|(own, _)| plain && *own == name) {
+            self.hidden_value(name, span, d);
+            return leaf(own.clone());
+        }
         match name {
             _ if !plain => {}
             "pi" => return Some(Expr::new(Node::Number(std::f64::consts::PI), span)),
@@ -123,9 +131,6 @@ impl Scope<'_> {
                 return leaf(Leaf::Time);
             }
             "e" | "f" | "q" | "p" => {
-                if let Some((_, variable)) = place.own.iter().find(|(own, _)| *own == name) {
-                    return leaf(Leaf::Own(*variable));
-                }
                 let error = Diagnostic::error(
                     "E0217",
                     span,
@@ -177,6 +182,23 @@ impl Scope<'_> {
                 }
                 None
             }
+        }
+    }
+
+    /// A warning where a field's own variable hides a parameter or signal.
+    fn hidden_value(&self, name: &str, span: Span, d: &mut Vec<Diagnostic>) {
+        let values = &self.frames[self.here.frame.0 as usize].values;
+        if let Some(meaning) = values.get(name) {
+            d.push(
+                Diagnostic::warning(
+                    "W0202",
+                    span,
+                    format!("`{name}` means the field's own variable here"),
+                )
+                .says("not the parameter or signal")
+                .label(self.value_span(*meaning), "which has the same name")
+                .help("give the parameter or signal another name"),
+            );
         }
     }
 
@@ -273,6 +295,17 @@ impl Scope<'_> {
 
     fn unknown(&self, frame: FrameId, name: &str, part: &Part, place: Place<'_>) -> Diagnostic {
         let span = part.span;
+        if place.own.first().is_some_and(|own| numbered(own.0).is_some())
+            && numbered(name).is_some()
+        {
+            return Diagnostic::error(
+                "E0217",
+                span,
+                format!("`{name}` is no variable of this field's laws"),
+            )
+            .says("no parameter or signal of this name either")
+            .help(place.own_help);
+        }
         let names = &self.frames[frame.0 as usize];
         let inside = frame != self.here.frame;
         let within = match inside {

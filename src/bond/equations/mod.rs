@@ -14,8 +14,8 @@ pub mod compiled;
 pub mod waveform;
 
 use super::graph::{
-    BondGraph, BondId, Dissipation, Expr, Law, Leaf, Modulus, Power, SignalId, SignalLaw, Storage,
-    StoreLaw, Variable, VertexId,
+    BondGraph, BondId, Dissipation, End, Expr, Law, Leaf, Modulus, Power, SignalId, SignalLaw,
+    Storage, StoreLaw, Variable, VertexId,
 };
 use crate::expr::{self, Binary, Function, Node};
 pub use compiled::Compiled;
@@ -26,8 +26,8 @@ pub use waveform::Wave;
 /// An unknown; states come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Unknown {
-    /// q or p of a storage.
-    Stored(VertexId),
+    /// q or p of a storage, at its port.
+    Stored(End),
     /// e or f of a storage in rate form.
     Rated(VertexId),
     /// A signal that is an integrator, or an algebraic one.
@@ -82,7 +82,7 @@ pub struct Equations {
     first_bond: usize,
     /// By signal: its unknown or its wave.
     signals: Vec<Option<Input>>,
-    /// By vertex: the unknown of its stored quantity.
+    /// By vertex: the unknown of its stored quantity, of a field that of its first port; the others follow it.
     stored: Vec<Option<u32>>,
     /// By vertex: the unknown of its state in rate form.
     rated: Vec<Option<u32>>,
@@ -139,9 +139,9 @@ impl Equations {
         }
     }
 
-    /// Index of a storage's q or p, where it is an unknown.
-    pub fn stored(&self, vertex: VertexId) -> Option<usize> {
-        self.stored[vertex.index()].map(|k| k as usize)
+    /// Index of a port's q or p, where it is an unknown.
+    pub fn stored(&self, end: End) -> Option<usize> {
+        self.stored[end.vertex.index()].map(|first| (first + end.port) as usize)
     }
 
     /// Index of the state of a storage in rate form.
@@ -159,23 +159,21 @@ impl Equations {
         let mut read = vec![false; graph.vertices.len()];
         every_expression(graph, &mut |expr| {
             expr.leaves(&mut |leaf, _| {
-                if let Leaf::Stored(vertex) = leaf {
-                    read[vertex.index()] = true;
+                if let Leaf::Stored(end) = leaf {
+                    read[end.vertex.index()] = true;
                 }
             });
         });
         for id in graph.vertex_ids() {
-            let own_stored = match &graph.vertex(id).law {
-                Law::Store { .. } => true,
-                Law::Rate { .. } => {
-                    self.rated[id.index()] =
-                        Some(self.state(Unknown::Rated(id), Origin::Vertex(id)));
-                    read[id.index()]
+            let rate_form = matches!(graph.vertex(id).law, Law::Rate { .. });
+            if rate_form {
+                self.rated[id.index()] = Some(self.state(Unknown::Rated(id), Origin::Vertex(id)));
+            }
+            for end in graph.law_ports(id) {
+                if graph.storage(end).is_some() && (!rate_form || read[id.index()]) {
+                    let k = self.state(Unknown::Stored(end), Origin::Vertex(id));
+                    self.stored[id.index()].get_or_insert(k);
                 }
-                _ => false,
-            };
-            if own_stored {
-                self.stored[id.index()] = Some(self.state(Unknown::Stored(id), Origin::Vertex(id)));
             }
         }
         for (i, signal) in graph.signals.iter().enumerate() {
@@ -225,30 +223,61 @@ impl Equations {
         self.origins.push(origin);
     }
 
-    /// An element's own flow at a port: counted in at port 0, out at port 1 of a two-port.
-    fn flow_at(&self, graph: &BondGraph, bond: BondId, vertex: VertexId, port: u32) -> Formula {
+    /// The flow into an element at a port.
+    fn flow_into(&self, graph: &BondGraph, bond: BondId, end: End) -> Formula {
         let flow = self.at(self.flow(bond));
-        let into = graph.sign_into(bond, vertex, port) > 0.0;
-        if into == (port == 0) { flow } else { flow.negate() }
+        let into = graph.sign_into(bond, end.vertex, end.port) > 0.0;
+        if into { flow } else { flow.negate() }
     }
 
     /// The rows of one junction or element.
     fn element(&mut self, graph: &BondGraph, id: VertexId) {
         let vertex = graph.vertex(id);
         let origin = Origin::Vertex(id);
-        let bonds = &vertex.bonds;
-        let own = |all: &Equations, variable: Power| match (bonds.first(), variable) {
-            (Some(bond), Power::Effort) => all.at(all.effort(*bond)),
-            (Some(bond), Power::Flow) => all.flow_at(graph, *bond, id, 0),
-            (None, _) => Formula::number(0.0),
-        };
         match &vertex.law {
             Law::Zero => self.junction(graph, id, Power::Effort),
             Law::One => self.junction(graph, id, Power::Flow),
-            Law::Source { sets, value, .. } => {
-                let Some(bond) = bonds.first() else { return };
+            Law::Source { .. } | Law::Dissipator(_) | Law::Store { .. } | Law::Rate { .. } => {
+                self.port(graph, End::only(id), &vertex.law);
+            }
+            Law::Field(field) => {
+                for (port, law) in (0..).zip(&field.ports) {
+                    self.port(graph, End { vertex: id, port }, law);
+                }
+            }
+            Law::Transformer(modulus) | Law::Gyrator(modulus) => {
+                let [first, second] = vertex.bonds[..] else { return };
+                let (e1, e2) = (self.at(self.effort(first)), self.at(self.effort(second)));
+                let f1 = self.flow_into(graph, first, End { vertex: id, port: 0 });
+                let f2 = self.at(self.flow(second));
+                let f2 = if graph.sign_into(second, id, 1) > 0.0 { f2.negate() } else { f2 };
+                let gyrates = matches!(vertex.law, Law::Gyrator(_));
+                let (value, rows) = match (modulus, gyrates) {
+                    (Modulus::Ratio(r), false) => (r, [(e1, e2), (f2, f1)]),
+                    (Modulus::Gain(g), false) => (g, [(e2, e1), (f1, f2)]),
+                    (Modulus::Ratio(r), true) => (r, [(e1, f2), (e2, f1)]),
+                    (Modulus::Gain(g), true) => (g, [(f1, e2), (f2, e1)]),
+                };
                 let value = self.lower(graph, value, Some(id));
-                self.row(origin, self.at(self.power(*bond, *sets)), value);
+                for (left, right) in rows {
+                    self.row(origin, left, value.clone().binary(Binary::Multiply, right));
+                }
+            }
+        }
+    }
+
+    /// The row of a one-port, or of one port of a field, and the rate of what it stores.
+    fn port(&mut self, graph: &BondGraph, end: End, law: &Law) {
+        let (id, origin) = (end.vertex, Origin::Vertex(end.vertex));
+        let Some(bond) = graph.bond_at(end) else { return };
+        let own = |all: &Equations, variable: Power| match variable {
+            Power::Effort => all.at(all.effort(bond)),
+            Power::Flow => all.flow_into(graph, bond, end),
+        };
+        match law {
+            Law::Source { sets, value, .. } => {
+                let value = self.lower(graph, value, Some(id));
+                self.row(origin, self.at(self.power(bond, *sets)), value);
             }
             Law::Dissipator(Dissipation::Linear(resistance)) => {
                 let law = self
@@ -265,7 +294,7 @@ impl Equations {
                 self.row(origin, own(self, Power::Flow), law);
             }
             Law::Store { kind, law, .. } => {
-                let Some(k) = self.stored(id) else { return };
+                let Some(k) = self.stored(end) else { return };
                 self.rates[k] = own(self, kind.integrates());
                 let (stored, gives) = (self.at(k), own(self, kind.gives()));
                 match law {
@@ -288,27 +317,11 @@ impl Equations {
                 self.rates[k] = self.lower(graph, rate, Some(id));
                 let (state, gives) = (self.at(k), own(self, kind.gives()));
                 self.row(origin, gives, state);
-                if let Some(q) = self.stored(id) {
+                if let Some(q) = self.stored(end) {
                     self.rates[q] = own(self, kind.integrates());
                 }
             }
-            Law::Transformer(modulus) | Law::Gyrator(modulus) => {
-                let [first, second] = bonds[..] else { return };
-                let (e1, e2) = (self.at(self.effort(first)), self.at(self.effort(second)));
-                let f1 = self.flow_at(graph, first, id, 0);
-                let f2 = self.flow_at(graph, second, id, 1);
-                let gyrates = matches!(vertex.law, Law::Gyrator(_));
-                let (value, rows) = match (modulus, gyrates) {
-                    (Modulus::Ratio(r), false) => (r, [(e1, e2), (f2, f1)]),
-                    (Modulus::Gain(g), false) => (g, [(e2, e1), (f1, f2)]),
-                    (Modulus::Ratio(r), true) => (r, [(e1, f2), (e2, f1)]),
-                    (Modulus::Gain(g), true) => (g, [(f1, e2), (f2, e1)]),
-                };
-                let value = self.lower(graph, value, Some(id));
-                for (left, right) in rows {
-                    self.row(origin, left, value.clone().binary(Binary::Multiply, right));
-                }
-            }
+            Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_) => {}
         }
     }
 
@@ -371,12 +384,10 @@ impl Equations {
     fn lower_leaf(&self, graph: &BondGraph, leaf: &Leaf, own: Option<VertexId>) -> Formula {
         let of = |vertex: VertexId, power: Power| match graph.vertex(vertex).bonds.first() {
             Some(bond) if power == Power::Effort => self.at(self.effort(*bond)),
-            Some(bond) => self.flow_at(graph, *bond, vertex, 0),
+            Some(bond) => self.flow_into(graph, *bond, End::only(vertex)),
             None => Formula::number(f64::NAN),
         };
-        let stored = |vertex: VertexId| {
-            self.stored(vertex).map_or(Formula::number(f64::NAN), |k| self.at(k))
-        };
+        let stored = |end: End| self.stored(end).map_or(Formula::number(f64::NAN), |k| self.at(k));
         match leaf {
             Leaf::Parameter(id) => Formula::number(graph.parameters[id.index()].value),
             Leaf::Signal(id) => self.leaf(self.signals[id.index()]),
@@ -384,12 +395,14 @@ impl Equations {
             Leaf::Own(Variable::Power(power)) => {
                 own.map_or(Formula::number(f64::NAN), |vertex| of(vertex, *power))
             }
-            Leaf::Own(Variable::Stored) => own.map_or(Formula::number(f64::NAN), stored),
+            Leaf::Own(Variable::Stored) => {
+                own.map_or(Formula::number(f64::NAN), |id| stored(End::only(id)))
+            }
             Leaf::Bond { bond, variable, negated } => {
                 let value = self.at(self.power(*bond, *variable));
                 if *negated { value.negate() } else { value }
             }
-            Leaf::Stored(vertex) => stored(*vertex),
+            Leaf::Stored(end) => stored(*end),
         }
     }
 
@@ -422,24 +435,9 @@ impl Equations {
 }
 
 /// Calls `visit` for every expression of the graph that holds during a run.
-pub fn every_expression(graph: &BondGraph, visit: &mut dyn FnMut(&Expr)) {
+pub fn every_expression<'a>(graph: &'a BondGraph, visit: &mut dyn FnMut(&'a Expr)) {
     for vertex in &graph.vertices {
-        match &vertex.law {
-            Law::Zero | Law::One => {}
-            Law::Source { value, .. } => visit(value),
-            Law::Dissipator(
-                Dissipation::Linear(law) | Dissipation::Effort(law) | Dissipation::Flow(law),
-            ) => visit(law),
-            Law::Store { law, .. } => match law {
-                StoreLaw::Linear(law) | StoreLaw::OfStored(law) | StoreLaw::OfPower(law) => {
-                    visit(law)
-                }
-            },
-            Law::Rate { rate, .. } => visit(rate),
-            Law::Transformer(modulus) | Law::Gyrator(modulus) => match modulus {
-                Modulus::Ratio(value) | Modulus::Gain(value) => visit(value),
-            },
-        }
+        vertex.law.expressions(visit);
     }
     for signal in &graph.signals {
         match &signal.law {
@@ -455,14 +453,14 @@ pub fn every_expression(graph: &BondGraph, visit: &mut dyn FnMut(&Expr)) {
 
 /// In the words of the graph: `q(tank)`, `e(a -> b)`, a signal's name.
 pub fn unknown_name(graph: &BondGraph, unknown: Unknown) -> String {
-    let stored = |id: VertexId| match &graph.vertex(id).law {
-        Law::Store { kind: Storage::Inertia, .. } | Law::Rate { kind: Storage::Inertia, .. } => "p",
-        _ => "q",
-    };
+    let inertia = |end: End| graph.storage(end) == Some(Storage::Inertia);
     match unknown {
-        Unknown::Stored(id) => format!("{}({})", stored(id), graph.vertex(id).name),
+        Unknown::Stored(end) => {
+            let letter = if inertia(end) { "p" } else { "q" };
+            format!("{letter}({})", graph.port_name(end))
+        }
         Unknown::Rated(id) => {
-            let power = if stored(id) == "p" { "f" } else { "e" };
+            let power = if inertia(End::only(id)) { "f" } else { "e" };
             format!("{power}({})", graph.vertex(id).name)
         }
         Unknown::Signal(id) => graph.signals[id.index()].name.clone(),
