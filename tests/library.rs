@@ -250,9 +250,9 @@ fn friction_sticks_and_slips() {
     let names = ["pull", "speed", "friction"];
     // A slip begins as an instability, which magnifies what was wrong before.
     for (reltol, tolerance) in [(None, 1e-3), (Some("1e-10"), 1e-6)] {
-        let trace = shipped("stick_slip", &options(reltol));
+        let trace = shipped("rough_belt", &options(reltol));
         let hand = by_hand(&trace, 500, [0.0; 2], &names, rate, observed);
-        agree("stick_slip", &trace, &hand, tolerance);
+        agree("rough_belt", &trace, &hand, tolerance);
         let speed = &trace.columns[2];
         let sticks = speed.iter().filter(|v| **v < 0.05 * pull).count();
         assert!(sticks > speed.len() / 2 && speed.iter().any(|v| *v > 4.0 * pull));
@@ -274,7 +274,7 @@ fn a_stop_returns_the_speed_of_its_closed_form() {
         }
         (low + high) / 2.0
     };
-    let trace = shipped("end_stop", &Overrides::default());
+    let trace = shipped("mass_between_stops", &Overrides::default());
     let (position, speed, force) = (&trace.columns[1], &trace.columns[2], &trace.columns[3]);
     let mut expected = 1.0;
     let mut free = vec![speed[0].abs()];
