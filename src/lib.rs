@@ -28,4 +28,5 @@ pub mod translate;
 pub mod sim;
 pub mod second;
 pub mod verify;
+pub mod lsp;
 pub mod cli;

@@ -20,6 +20,7 @@ pub mod examples;
 pub mod completions;
 pub mod man;
 pub mod explain;
+pub mod lsp;
 
 use crate::diagnostic::Diagnostic;
 use crate::quantity::nearest;
@@ -70,6 +71,7 @@ pub const COMMANDS: &[Command] = &[
     command!(completions),
     command!(man),
     command!(explain),
+    command!(lsp),
 ];
 
 /// The whole command line, as clap knows it.

@@ -138,6 +138,38 @@ fn read_bytes(path: &str, limit: u64) -> Result<Vec<u8>, LoadError> {
     Ok(bytes)
 }
 
+/// The files below a folder whose names have an ending, sorted, `most` at most; hidden folders and what builds leave
+/// behind are passed over.
+pub fn list(folder: &str, ending: &str, most: usize) -> Vec<String> {
+    const DEPTH: usize = 8;
+    const MOST_ENTRIES: usize = 100_000;
+    let mut found = vec![];
+    let mut seen = 0;
+    let mut folders = vec![(std::path::PathBuf::from(folder), 0)];
+    while let Some((folder, depth)) = folders.pop() {
+        let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+        for entry in entries.flatten() {
+            seen += 1;
+            if seen > MOST_ENTRIES || found.len() >= most {
+                break;
+            }
+            let name = entry.file_name().to_string_lossy().into_owned();
+            // Links are not followed: they may lead in circles.
+            let Ok(kind) = entry.file_type() else { continue };
+            if kind.is_dir() {
+                let skipped = name.starts_with('.') || name == "target" || name == "node_modules";
+                if !skipped && depth < DEPTH {
+                    folders.push((entry.path(), depth + 1));
+                }
+            } else if name.ends_with(ending) {
+                found.push(entry.path().to_string_lossy().replace('\\', "/"));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
 /// A system error without Rust's `(os error 2)`.
 pub fn reason(error: &std::io::Error) -> String {
     let text = error.to_string();

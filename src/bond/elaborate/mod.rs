@@ -58,6 +58,11 @@ pub struct Overrides {
     pub folders: Vec<String>,
 }
 
+/// Every function beyond those of expressions, and its form: `lag(x, tau, [ic])`.
+pub fn forms() -> impl Iterator<Item = (&'static str, String)> {
+    functions::CALLS.iter().map(|row| (row.name, row.form()))
+}
+
 /// Makes the graph of a program: its first file, and what that imports. `None` when anything was wrong; errors in `d`
 /// of an earlier stage count too, since a statement that could not be read leaves a hole.
 pub fn elaborate(
