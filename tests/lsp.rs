@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -477,7 +477,9 @@ fn renaming_keeps_the_meaning() {
     let mut client = Client::new(folder.path());
     client.open(&drive, DRIVE);
     let uris = [motor.as_str(), drive.as_str()];
-    let cases: [(&str, &str, &str, &[&str], &[&str]); 9] = [
+    // File, place, new name; what the motor and the drive hold afterwards.
+    type Case<'c> = (&'c str, &'c str, &'c str, &'c [&'c str], &'c [&'c str]);
+    let cases: [Case<'_>; 9] = [
         (
             &drive,
             "feed -> m.sup|ply",

@@ -108,7 +108,9 @@ mod tests {
                 Incoming::Message(Message::Request(request)) => request.method,
                 Incoming::Message(Message::Notification(notification)) => notification.method,
                 Incoming::Message(Message::Response(_)) => "answer".into(),
-                Incoming::Bad(response) => format!("bad {}", response.error.unwrap().code),
+                Incoming::Bad(response) => {
+                    format!("bad {}", response.response_result.unwrap_err().code)
+                }
                 Incoming::End => return found,
             });
         }
