@@ -278,6 +278,10 @@ fn equation(analysis: &Analysis, symbol: &Symbol, law: &Law) -> Option<String> {
     };
     Some(match law {
         Law::Source { detector: true, .. } | Law::Zero | Law::One => return None,
+        Law::Field(_) => {
+            let laws: Vec<&str> = arguments.iter().map(|law| analysis.source(law.span)).collect();
+            laws.join(", ")
+        }
         Law::Source { sets: Power::Effort, .. } => format!("e = {value}"),
         Law::Source { sets: Power::Flow, .. } => format!("f = {value}"),
         Law::Dissipator(Dissipation::Linear(_)) => format!("e = {held}·f"),
@@ -321,7 +325,7 @@ fn value(graph: &BondGraph, law: &Law) -> Option<String> {
 /// The domain at each port.
 fn domains(graph: &BondGraph, vertex: &Vertex) -> Option<String> {
     let mut rows: Vec<Domain> = vertex.bonds.iter().map(|bond| graph.bond(*bond).domain).collect();
-    if !matches!(vertex.law, Law::Transformer(_) | Law::Gyrator(_)) {
+    if !matches!(vertex.law, Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_)) {
         rows.truncate(1);
     }
     rows.dedup();
@@ -347,19 +351,30 @@ fn causality(graph: &BondGraph, causality: &Causality, id: VertexId) -> Option<S
         true => "stroke at its side: effort in, flow out",
         false => "stroke at the far side: flow in, effort out",
     };
+    let storage = |end: End| {
+        let dependent = causality.dependent.iter().find(|row| row.storage == end);
+        Some(match dependent {
+            Some(row) => {
+                let on: Vec<String> =
+                    row.on.iter().map(|on| format!("`{}`", graph.port_name(*on))).collect();
+                format!("derivative causality, determined by {}", on.join(", "))
+            }
+            None if causality.states.contains(&end) => "integral causality, a state".to_string(),
+            None => return None,
+        })
+    };
     match (&vertex.law, vertex.bonds.as_slice()) {
         (Law::Store { .. } | Law::Rate { .. }, [bond, ..]) => {
-            let dependent = causality.dependent.iter().find(|row| row.storage == id);
-            let kind = match dependent {
-                Some(row) => {
-                    let on: Vec<String> =
-                        row.on.iter().map(|on| format!("`{}`", graph.vertex(*on).name)).collect();
-                    format!("derivative causality, determined by {}", on.join(", "))
-                }
-                None if causality.states.contains(&id) => "integral causality, a state".to_string(),
-                None => return None,
-            };
+            let kind = storage(End { vertex: id, port: 0 })?;
             Some(format!("{kind}; {}", stroke(receives(*bond, 0)?)))
+        }
+        (Law::Field(_), bonds) => {
+            let said = graph.law_ports(id).zip(bonds).filter_map(|(end, bond)| {
+                let stroke = stroke(receives(*bond, end.port)?);
+                let kind = storage(end).map_or(String::new(), |kind| format!("{kind}; "));
+                Some(format!("port {}: {kind}{stroke}", end.port + 1))
+            });
+            Some(said.collect::<Vec<_>>().join("  \n"))
         }
         (Law::Zero | Law::One, bonds) => {
             // The one bond that sets the common variable.

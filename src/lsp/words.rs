@@ -15,7 +15,10 @@ pub const LAWS: &[(&str, &str)] = &[
         "I",
         "f = p/I with p = ∫e dt, or a law `I:name(f = …p…)`, `I:name(p = …f…)`, or the rate form `I:name(der(f) = …e…)`; starts at `p0 =` or `f0 =`",
     ),
-    ("IC", "a field: numbered laws over stored q and p, as `IC:coil(f1 = p1/L(q2), e2 = …)`"),
+    (
+        "IC",
+        "a field of ports that store q and ports that store p: numbered laws, as `IC:coil(f1 = p1/L(q2), e2 = …)`",
+    ),
     ("TF", "ratio r: e1 = r·e2, f2 = r·f1; `gain = g`: e2 = g·e1, f1 = g·f2"),
     ("GY", "ratio r: e1 = r·f2, e2 = r·f1; `gain = g`: f1 = g·e2, f2 = g·e1"),
     ("De", "f = 0: measures the effort, `e(name)`"),

@@ -45,6 +45,8 @@ pub const EXAMPLES: &[(&str, &str)] = examples! {
     "textbook/E4.bg"
     "textbook/F1.bg"
     "textbook/F2.bg"
+    "textbook/G1.bg"
+    "textbook/G2.bg"
 };
 
 /// The row of a name, with or without its ending.
