@@ -6,6 +6,7 @@
 
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::pipeline::run_text;
+use bondspice::source::library::LIBRARY;
 use bondspice::trace::{Trace, compare, csv};
 use std::f64::consts::PI;
 
@@ -130,6 +131,39 @@ fn by_hand<const N: usize>(
         }
     }
     trace
+}
+
+#[test]
+fn the_actuator_of_two_lines() {
+    const OBSERVED: &str = "x, theta, f(motor.armature) as \"I\", f(motor.rotor) as \"Omega\", \
+        e(pump1) as \"Pp1\", e(pump2) as \"Pp2\", f(pump.out.2) - f(pump.gap) as \"Qp\", f(pump.gap) as \"Qlp\", \
+        f(line1.flow) as \"Ql1\", f(line2.flow) as \"Ql2\", f(valve1.flow) as \"Qaccu1\", \
+        f(valve2.flow) as \"Qaccu2\", f(limiter.flow) as \"Qsat\", e(jack.side1) as \"Pj1\", \
+        e(jack.side2) as \"Pj2\", f(jack.gap) as \"Qlj\", e(jack.chamber1.fluid) as \"Pc1\", \
+        e(jack.chamber2.fluid) as \"Pc2\", e(attachment.force) as \"Fj\", f(jack.moving) as \"Vj\", \
+        f(surface) as \"Omega_FC\", control.alpha as \"alpha\", control.I_ref as \"Iref\", \
+        control.w_ref as \"Omega_ref\", power(bus) as \"Pelec\"";
+    const STEP: [&str; 2] = [
+        "x_ref = step(0.1 s, 0 mm, 20 mm)",
+        "M_FC = pwl(0 s, 0 N*m; 0.5 s, 0 N*m; 0.6 s, -6 kN*m; 1 s, -6 kN*m)",
+    ];
+    const OVERLOAD: [&str; 2] = [
+        "x_ref = 0 m",
+        "M_FC = pwl(0 s, 0 N*m; 0.1 s, 0 N*m; 0.4 s, 16.7 kN*m; 0.6 s, 16.7 kN*m; 0.9 s, 0 N*m)",
+    ];
+    for (name, drives, until) in
+        [("two_line_step", STEP, "1 s"), ("two_line_overload", OVERLOAD, "1.5 s")]
+    {
+        for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+            let mut overrides = options(reltol);
+            overrides.drive = drives.map(str::to_string).to_vec();
+            overrides.until = Some(until.to_string());
+            overrides.observe = Some(OBSERVED.to_string());
+            let trace = shipped("eha_two_line", &overrides);
+            let reference = common(&trace, reference(&format!("eha/{name}")), 26);
+            agree(name, &trace, &reference, tolerance);
+        }
+    }
 }
 
 #[test]
@@ -512,4 +546,43 @@ fn an_integrator_does_not_wind_up() {
         let trace = run("pi.bg", text, &options(reltol));
         agree("pi", &trace, &closed_form(&trace, &[("y", &y)]), tolerance);
     }
+}
+
+/// The examples of docs/library.md: one for each model of the library, complete files.
+#[test]
+fn the_examples_of_the_documentation_run() {
+    let text = file("docs/library.md");
+    let mut shown = vec![];
+    for section in text.split("\n### ").skip(1) {
+        let name = section.lines().next().unwrap_or_default();
+        let example = section.split("```bg\n").nth(1).and_then(|rest| rest.split("\n```").next());
+        let example = example.unwrap_or_else(|| panic!("{name} has no example"));
+        assert!(example.contains(&format!("{name}:")), "{name} does not stand in its example");
+        let trace = run(&format!("{name}.bg"), &format!("{example}\n"), &Overrides::default());
+        assert!(trace.rows() > 20 && trace.columns.iter().flatten().all(|value| value.is_finite()));
+        shown.push(name.to_string());
+    }
+    let mut models = vec![];
+    for (_, text) in LIBRARY {
+        for line in text.lines().filter_map(|line| line.strip_prefix("model ")) {
+            let (name, header) = line.split_once('(').expect("a header");
+            let header = header.trim_end_matches(" {").trim_end_matches(')');
+            models.push(name.to_string());
+            // Its parameters, as they stand there.
+            let section = text_of(&file("docs/library.md"), name);
+            for parameter in header.split(", ") {
+                assert!(section.contains(&format!("`{parameter}`")), "{name}: {parameter}");
+            }
+        }
+    }
+    shown.sort();
+    models.sort();
+    assert_eq!(shown, models);
+}
+
+/// The section of a model in the documentation.
+fn text_of(text: &str, name: &str) -> String {
+    let begin = format!("\n### {name}\n");
+    let at = text.find(&begin).unwrap_or_else(|| panic!("no section on {name}")) + begin.len();
+    text[at..].split("\n### ").next().unwrap_or_default().to_string()
 }

@@ -207,6 +207,9 @@ fn march(
         let weights = sizes.weights(settings.tolerance, pilot);
         let mut radau = Radau::new(&mut prepared.compiled, weights);
         radau.growing = if pilot { settings.tolerance } else { 0.0 };
+        if pilot {
+            radau.mind_rounding(from, to, &y);
+        }
         radau.maximum_steps = settings.maximum_steps.saturating_sub(statistics.accepted);
         let first = first_step(&mut radau, from, to, &y, h);
         let outcome = radau.segment(from, to, &mut y, first, &mut |step| {

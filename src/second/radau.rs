@@ -43,6 +43,9 @@ const CONVERGED: f64 = 1e-3;
 /// or below this one when rounding keeps it from getting better.
 const ROUNDING: f64 = 0.05;
 
+/// How far the error allowed is kept above what rounding of the equations leaves open.
+const ABOVE_ROUNDING: f64 = 100.0;
+
 /// Where within a step the collocation polynomial is held against the algebraic equations: between its nodes.
 const BETWEEN: [f64; 2] = [0.4, 0.85];
 /// How much more error is allowed to algebraic unknowns there: it is seen in the output and carried no further.
@@ -152,6 +155,42 @@ impl<'a> Radau<'a> {
             real_values: vec![0.0; entries],
             complex_values: vec![Complex::ZERO; entries],
             mass_slots,
+        }
+    }
+
+    /// Allows each unknown at least what rounding of the equations at `y` leaves open: where all flows begin at 0,
+    /// their sizes say nothing, and those of the pressures they balance do.
+    pub fn mind_rounding(&mut self, from: f64, to: f64, y: &[f64]) {
+        let n = self.compiled.n;
+        let (mut f, mut work) = (vec![0.0; n], vec![0.0; n]);
+        let mut jacobian = vec![0.0; self.compiled.pattern.len()];
+        self.compiled.jacobian(from, 0.5 * (from + to), y, &mut f, &mut jacobian);
+        let mut noise = vec![0.0; n];
+        for (j, value) in y.iter().enumerate() {
+            for slot in self.compiled.pattern.column(j) {
+                let row = self.compiled.pattern.rows[slot] as usize;
+                noise[row] += f64::EPSILON * (jacobian[slot] * value).abs();
+            }
+        }
+        // Within so short a step states stand still.
+        noise[..self.compiled.states].fill(0.0);
+        if !self.factor(1e-9 * (to - from), &jacobian) {
+            return;
+        }
+        let Some(real) = self.real.as_ref() else { return };
+        // Rounding has either sign: of two patterns one does not cancel.
+        for odd in [1.0, -1.0] {
+            let mut change: Vec<f64> = noise
+                .iter()
+                .enumerate()
+                .map(|(i, noise)| if i % 2 == 0 { *noise } else { odd * noise })
+                .collect();
+            real.solve(&mut change, &mut work);
+            for (weight, change) in self.weights.iter_mut().zip(&change) {
+                if change.is_finite() {
+                    *weight = weight.max(ABOVE_ROUNDING * change.abs());
+                }
+            }
         }
     }
 

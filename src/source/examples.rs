@@ -21,6 +21,7 @@ pub const EXAMPLES: &[(&str, &str)] = examples! {
     "solenoid.bg"
     "eha_one_line.bg"
     "eha_components.bg"
+    "eha_two_line.bg"
     "drive_train.bg"
     "step_down.bg"
     "ten_motors.bg"
