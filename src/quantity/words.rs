@@ -39,6 +39,7 @@ const WORDS: &[Word] = &[
     word("m/s^2", "acceleration", [1, 0, -2, 0, 0]),
     word("rad/s^2", "angular acceleration", [0, 0, -2, 0, 0]),
     word("s^2", "squared time", [0, 0, 2, 0, 0]),
+    word("m^2/s^2", "squared velocity", [2, 0, -2, 0, 0]),
     word("kg/m^3", "density", [-3, 1, 0, 0, 0]),
     word("C", "charge", [0, 0, 1, 1, 0]),
     word("Wb", "flux", [2, 1, -2, -1, 0]),
@@ -76,15 +77,20 @@ impl Dimension {
         if let Some(word) = WORDS.iter().find(|word| word.dimension == self) {
             return word.unit.to_string();
         }
-        let cost = |n: i16, d: i16| if n == 0 { 0 } else { n.saturating_abs().saturating_add(2 * (d.min(99) - 1)) };
-        let length = |d: Dimension| d.0.iter().map(|(n, d)| cost(*n, *d)).fold(0, i16::saturating_add);
+        let cost = |n: i16, d: i16| {
+            if n == 0 { 0 } else { n.saturating_abs().saturating_add(2 * (d.min(99) - 1)) }
+        };
+        let length =
+            |d: Dimension| d.0.iter().map(|(n, d)| cost(*n, *d)).fold(0, i16::saturating_add);
         let mut best = (length(self), self.to_string());
         for name in PARTS {
             let Some(part) = row(name) else { continue };
             for (n, d) in [(1i16, 1i16), (-1, 1), (1, 2), (-1, 2), (2, 1), (-2, 1)] {
                 let power = part.dimension.power(i64::from(n), i64::from(d));
                 let Some(rest) = power.and_then(|power| self.over(power)) else { continue };
-                let total = length(rest).saturating_add(cost(n, d));
+                // A named unit says more than base units, and less below a fraction's line.
+                let named = cost(n, d) + 1 + i16::from(n < 0);
+                let total = length(rest).saturating_add(named);
                 if total < best.0 {
                     best = (total, rest.spell(&[(name, (n, d))]));
                 }
