@@ -307,9 +307,18 @@ impl Inference<'_, '_> {
             Task::Parameter(k) => {
                 let Some((value, here)) = self.scope.parameter_value(k as usize) else { return };
                 let mut found = self.dimension(task, value, here);
-                // A bare number that an instance is given is in the unit of the model's default.
-                if let (Some(Dim::Bare), Some((value, here))) = (found, self.defaults[k as usize]) {
-                    found = self.dimension(task, value, here);
+                if let Some((value, here)) = self.defaults[k as usize] {
+                    self.scope.here = here;
+                    let default = self.scope.dimension(value, None);
+                    found = match found {
+                        // A bare number that an instance is given is in the unit of the model's default.
+                        Some(Dim::Bare) => self.dimension(task, value, here),
+                        // A wrong unit is said where it is given, and nowhere else.
+                        Some(Dim::Known(given)) if default.known().is_some_and(|d| d != given) => {
+                            None
+                        }
+                        other => other,
+                    };
                 }
                 if let Some(dim @ Dim::Known(_)) = found {
                     self.scope.parameter_dimensions[k as usize] = dim;

@@ -295,7 +295,7 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
     (
         "m -> C:c(der(e) = f/(10 mH))",
         "E0307",
-        &["f/(10 mH)", "Se:U(10 V)"],
+        &["f/(10 mH", "Se:U(10 V)"],
         "`der(e) = …` of the compliance `c`",
     ),
     ("m -> I:l(1 mH, f0 = 2 V)", "E0307", &["2 V", "Se:U(10 V)"], "`f0 = …` of the inertia `l`"),
