@@ -275,10 +275,12 @@ impl<'w, 'a> Walk<'w, 'a> {
             if self.scope.variable(name).is_some() {
                 return if self.strict { Dim::Bare } else { Dim::Unknown };
             }
+            // Numbered ones are those of a field; elsewhere they are names like others.
             if let Some((what, port)) = own_variable(name)
                 && let Some(id) = self.own
-                // Numbered ones are those of a field; elsewhere they are names like others.
-                && (name.len() == 1 || self.scope.graph.vertex(id).bonds.len() > 1)
+                && (name.len() == 1
+                    || self.scope.graph.vertex(id).bonds.len() > 1
+                    || self.scope.value(name).is_none())
             {
                 let bond = self.scope.graph.vertex(id).bonds.get(port).copied();
                 return bond.map_or(Dim::Unknown, |bond| self.bond(what, bond));

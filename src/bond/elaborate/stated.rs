@@ -148,7 +148,9 @@ fn labelled(argument: &Argument) -> Option<(Clue, Option<usize>)> {
     let name = argument.label.as_ref()?.name.text.as_str();
     let (what, port) = match name {
         "e0" | "f0" | "q0" | "p0" => (&name[..1], None),
-        _ => own_variable(name).map(|(what, port)| (what, Some(port)))?,
+        // `q2_0` is the initial value of a field's port.
+        _ => own_variable(name.strip_suffix("_0").unwrap_or(name))
+            .map(|(what, port)| (what, Some(port)))?,
     };
     let clue = match what {
         "e" => Clue::Effort,
