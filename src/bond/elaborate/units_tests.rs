@@ -132,6 +132,8 @@ const RIGHT: &[&str] = &[
     "simulate until 3",
     "observe e(U) in kV, f(shaft) in rpm, power(U) in kW, pr + 3 in psi",
     "observe sum(k in 1..3, k*vt) in V",
+    "I:coils([1 mH, 2 uH; 2 uH, 1 mH], p0 = [0, 3 mWb])\nm -> coils.1\ncoils.2 -> R:d(1 Ohm)",
+    "C:plate(e1 = q1*(1 mm + q2)/(3e-12 F*m), e2 = q1^2/(6e-12 F*m), q1_0 = 1 uC, q2_0 = 2 mm)\nm -> plate.1\nplate.2 -> I:mass(1 g)",
 ];
 
 /// Lines that are wrong, each beside [`AROUND`]: the code, what the first two labels point at, a part of the message.
@@ -259,6 +261,24 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
         "`e = …` of the dissipator `r`",
     ),
     ("m -> C:c(e = q/1e-5)", "E0307", &["q/1e-5", "Se:U(10 V)"], "is a charge (C), but"),
+    (
+        "I:coils([1 mH, 2 uH; 2 uH, 1 mF])\nm -> coils.1\ncoils.2 -> R:d(1 Ohm)",
+        "E0307",
+        &["1 mF", "R:d(1 Ohm)"],
+        "the value of the inertia `coils` is a capacitance (F)",
+    ),
+    (
+        "C:plate(e1 = q1*(1 mm + q2)/(3e-12 F), e2 = q1^2/(6e-12 F*m))\nm -> plate.1\nplate.2 -> I:mass(1 g)",
+        "E0307",
+        &["q1*(1 mm + q2)/(3e-12 F", "Se:U(10 V)"],
+        "`e1 = …` of the compliance `plate`",
+    ),
+    (
+        "C:plate(e1 = q1*(1 mm + q2)/(3e-12 F*m), e2 = q1^2/(6e-12 F*m), q2_0 = 3 s)\nm -> plate.1\nplate.2 -> I:mass(1 g)",
+        "E0307",
+        &["3 s", "I:mass(1 g)"],
+        "`q2_0 = …` of the compliance `plate`",
+    ),
     ("m -> R:r(f = e/(3 A))", "E0307", &["e/(3 A", "Se:U(10 V)"], "`f = …` of the dissipator `r`"),
     ("m -> R:r(e = vt*tanh(f/vt))", "E0305", &["f/vt", "5 V"], "`tanh` takes a pure number"),
     (
