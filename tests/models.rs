@@ -414,7 +414,7 @@ fn netlists_read_back_give_the_run_of_their_model() {
 
 #[test]
 fn powers_read_back_have_the_same_bits() {
-    let text = "Se:U(sine(8 Pa, 4 Pa, 1 Hz)) -> 1:a -> R:n(f = orifice(e, 0.05, 0.1)), 0:b\n\
+    let text = "Se:U(sine(8, 4, 1)) -> 1:a -> R:n(f = orifice(e, 0.05, 0.1)), 0:b\n\
                 b -> C:c(0.1), R:r(e = 0.1*f^3 + 2*f + 0.01*f^5)\nsimulate until 4 s step 0.1 s\n\
                 observe e(b) as \"e\", f(n) as \"f\"\n";
     let (trace, _) = run_text("orifice.bg", text, &Overrides::default()).expect("it runs");

@@ -63,15 +63,14 @@ pub(super) fn reduce(numerator: i64, denominator: i64) -> Option<(i16, i16)> {
     Some((i16::try_from(sign * numerator / a).ok()?, i16::try_from(sign * denominator / a).ok()?))
 }
 
-impl std::fmt::Display for Dimension {
-    /// In base units: `kg*m^2/s^3`; `1` for a pure number.
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl Dimension {
+    /// The product of named units with these exponents and of base units: `Pa^(1/2)*s/m^3`.
+    pub(super) fn spell(self, named: &[(&str, (i16, i16))]) -> String {
+        let factors = || named.iter().copied().chain(BASE.iter().copied().zip(self.0));
         let part = |sign: i16| {
-            self.0
-                .iter()
-                .zip(BASE)
-                .filter(|((n, _), _)| n.signum() == sign)
-                .map(|((n, d), name)| match (n.abs(), d) {
+            factors()
+                .filter(|(_, (n, _))| n.signum() == sign)
+                .map(|(name, (n, d))| match (n.unsigned_abs(), d) {
                     (1, 1) => name.to_string(),
                     (n, 1) => format!("{name}^{n}"),
                     (n, d) => format!("{name}^({n}/{d})"),
@@ -80,11 +79,18 @@ impl std::fmt::Display for Dimension {
         };
         let (above, below) = (part(1), part(-1));
         let above = if above.is_empty() { "1".to_string() } else { above.join("*") };
-        match below.len() {
-            0 => write!(out, "{above}"),
-            1 => write!(out, "{above}/{}", below[0]),
-            _ => write!(out, "{above}/({})", below.join("*")),
+        match below.as_slice() {
+            [] => above,
+            [one] => format!("{above}/{one}"),
+            several => format!("{above}/({})", several.join("*")),
         }
+    }
+}
+
+impl std::fmt::Display for Dimension {
+    /// In base units: `kg*m^2/s^3`; `1` for a pure number.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{}", self.spell(&[]))
     }
 }
 

@@ -5,9 +5,12 @@ mod symbols;
 mod unit;
 mod domain;
 mod nearest;
+mod words;
+mod relations;
 
 pub use dimension::Dimension;
 pub use domain::{DOMAINS, Domain, DomainRow};
 pub use nearest::{is_slip, nearest};
+pub use relations::{Disagreement, Formula, Relations};
 pub use symbols::{PREFIXES, SYMBOLS, Symbol, is_unit_name};
 pub use unit::{Unit, UnitError, scan_unit};

@@ -1,15 +1,23 @@
-//! Dimensions of expressions, as far as their units tell: the base of domains and of the units of columns.
+//! Dimensions of expressions, inferred and checked by one walk.
 //!
 //! A bare number is dimensionless as a factor, dividend, divisor or exponent; as a whole value its unit is unknown,
-//! which agrees with anything. Nothing is checked here.
+//! which agrees with anything and makes products unknown. Where two sides clash the value is unknown, so that one
+//! mistake gives one error. How the arguments of a function hang together is a table (`agreements`); what is said of a
+//! clash stands in `clashes`.
+//!
+//! A model without units is unchecked: in its expressions bare numbers, readings and `time` are unknown, and only what
+//! comes from outside with a unit has one.
 
-use super::frames::{Thing, name_alone};
-use super::scope::{Meaning, Scope, Valued};
-use crate::bond::elements::Shape;
+use super::agreements::{Agreement, Form, agreement};
+use super::clashes::{Clash, Side};
+use super::frames::{Round, Thing, name_alone};
+use super::has_units::says_units;
+use super::scope::{Meaning, Scope};
 use crate::bond::graph::*;
-use crate::bond::syntax::{self, Call, Path, Value};
+use crate::bond::syntax::{self, Argument, Call, Path, Value};
 use crate::expr::{Binary, Function, Node, Unary};
-use crate::quantity::{Dimension, Domain};
+use crate::quantity::{Dimension, Domain, Formula, Relations};
+use crate::source::Span;
 
 /// What is known of the dimension of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +33,7 @@ pub(super) enum Dim {
 pub(super) const SECOND: Dimension = Dimension::new(0, 0, 1, 0, 0);
 
 impl Dim {
-    fn of(dimension: Option<Dimension>) -> Dim {
+    pub(super) fn of(dimension: Option<Dimension>) -> Dim {
         dimension.map_or(Dim::Unknown, Dim::Known)
     }
 
@@ -39,16 +47,7 @@ impl Dim {
         if let Dim::Known(dimension) = self { Some(dimension) } else { None }
     }
 
-    /// Of a sum, or of two branches.
-    fn same(self, other: Dim) -> Dim {
-        match (self, other) {
-            (Dim::Known(a), _) | (_, Dim::Known(a)) => Dim::Known(a),
-            (Dim::Bare, Dim::Bare) => Dim::Bare,
-            _ => Dim::Unknown,
-        }
-    }
-
-    fn times(self, other: Dim) -> Dim {
+    pub fn times(self, other: Dim) -> Dim {
         match (self, other) {
             (Dim::Unknown, _) | (_, Dim::Unknown) => Dim::Unknown,
             (Dim::Bare, Dim::Bare) => Dim::Bare,
@@ -63,191 +62,464 @@ impl Dim {
             other => other,
         }
     }
-
-    fn power(self, exponent: Option<f64>) -> Dim {
-        let Dim::Known(base) = self else { return self };
-        if base.is_none() {
-            return self;
-        }
-        let Some(exponent) = exponent else { return Dim::Unknown };
-        for denominator in [1i64, 2, 3, 4, 5, 6, 10] {
-            let numerator = exponent * denominator as f64;
-            if numerator.fract() == 0.0 && numerator.abs() < 1e4 {
-                return Dim::of(base.power(numerator as i64, denominator));
-            }
-        }
-        Dim::Unknown
-    }
 }
 
-impl Scope<'_> {
-    /// Finds the dimensions of parameters, whatever their order.
-    pub fn infer_parameter_dimensions(&mut self) {
-        // Each round settles at least the parameters whose operands were settled before it.
-        for _ in 0..self.parameters.len().min(64) {
-            let mut changed = false;
-            for k in 0..self.parameters.len() {
-                let Some(Valued { value, here, .. }) = self.parameters[k] else { continue };
-                let found = self.at(here, |scope| scope.dimension(value, None)).whole();
-                if found != Dim::Unknown && self.parameter_dimensions[k] == Dim::Unknown {
-                    self.parameter_dimensions[k] = found;
-                    changed = true;
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
+/// The fraction of a constant exponent, as 1/3 and 1.85 are fractions.
+fn fraction(exponent: f64) -> Option<(i64, i64)> {
+    (1..=100i64).find_map(|denominator| {
+        let numerator = exponent * denominator as f64;
+        let whole = numerator.round();
+        let exact = (numerator - whole).abs() <= 1e-9 && whole.abs() < 1e4;
+        exact.then_some((whole as i64, denominator))
+    })
+}
+
+/// What the dimension of an expression waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Open {
+    Parameter(ParameterId),
+    Signal(SignalId),
+    /// The domain of a bond.
+    Bond(BondId),
+}
+
+/// A walk over expressions.
+pub(super) struct Walk<'w, 'a> {
+    pub scope: &'w mut Scope<'a>,
+    /// The element in whose law the expression stands.
+    pub own: Option<VertexId>,
+    /// Whether the model that it stands in has units.
+    strict: bool,
+    /// What was met and is not known, where somebody waits for it.
+    pub open: Option<Vec<Open>>,
+    /// Where clashes go; they are only looked for when there is a place.
+    pub clashes: Option<&'w mut Vec<Clash>>,
+}
+
+impl<'w, 'a> Walk<'w, 'a> {
+    /// A walk that finds dimensions and reports nothing, over expressions that stand where the scope is.
+    pub fn new(scope: &'w mut Scope<'a>, own: Option<VertexId>) -> Walk<'w, 'a> {
+        let strict = scope.has_units();
+        Walk { scope, own, strict, open: None, clashes: None }
     }
 
-    /// Finds the dimensions of signals, whatever their order; what drives an input tells the input's.
-    pub fn infer_signal_dimensions(&mut self) {
-        self.signal_dimensions = vec![Dim::Unknown; self.graph.signals.len()];
-        for _ in 0..self.signals.len().min(64) {
-            let mut changed = false;
-            let mut values: Vec<(usize, Valued<'_>)> = vec![];
-            values.extend(
-                self.signals.iter().enumerate().filter_map(|(k, valued)| Some((k, (*valued)?))),
-            );
-            for at in 0..self.drives.len() {
-                let (name, valued) = self.drives[at];
-                let meaning =
-                    self.at(valued.here, |scope| scope.key(name).and_then(|key| scope.value(&key)));
-                if let Some(Meaning::Signal(id)) = meaning {
-                    values.push((id.index(), valued));
-                }
-            }
-            for (k, valued) in values {
-                let dim = self.at(valued.here, |scope| scope.dimension(valued.value, None)).whole();
-                if dim != Dim::Unknown && self.signal_dimensions[k] == Dim::Unknown {
-                    self.signal_dimensions[k] = dim;
-                    changed = true;
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
-    }
-
-    /// The dimension of an expression; `own` is the element in whose law it stands.
-    pub fn dimension(&self, expr: &syntax::Expr, own: Option<VertexId>) -> Dim {
-        let dim = |expr| self.dimension(expr, own);
+    /// The dimension of an expression.
+    pub fn dimension(&mut self, expr: &syntax::Expr) -> Dim {
+        let bare = if self.strict { Dim::Bare } else { Dim::Unknown };
         match &*expr.node {
-            Node::Number(_) => Dim::Bare,
+            Node::Number(_) => bare,
             Node::Leaf(syntax::Leaf::Quantity(_, unit)) => Dim::Known(unit.dimension),
-            Node::Leaf(syntax::Leaf::Name(path)) => self.name_dimension(path, own),
-            Node::Leaf(syntax::Leaf::Call(call)) => self.call_dimension(call, own),
-            Node::Leaf(syntax::Leaf::Sum(sum)) => dim(&sum.term),
-            Node::Unary(Unary::Negate, a) => dim(a),
-            Node::Unary(Unary::Not, _) => Dim::Known(Dimension::NONE),
-            Node::Binary(op, a, b) => match op {
-                Binary::Add | Binary::Subtract => dim(a).same(dim(b)),
-                Binary::Multiply => dim(a).times(dim(b)),
-                Binary::Divide => dim(a).times(dim(b).inverse()),
-                Binary::Power => dim(a).power(b.constant()),
-                _ => Dim::Known(Dimension::NONE),
-            },
-            Node::Call(function, arguments) => match (function, arguments.as_slice()) {
-                (Function::Abs | Function::Floor | Function::Mod, [a, ..]) => dim(a),
-                (Function::Min | Function::Max | Function::Clamp, [a, rest @ ..]) => {
-                    rest.iter().fold(dim(a), |known, b| known.same(dim(b)))
+            Node::Leaf(syntax::Leaf::Name(path)) => self.name(path),
+            Node::Leaf(syntax::Leaf::Call(call)) => self.call(call, expr),
+            Node::Leaf(syntax::Leaf::Sum(sum)) => self.sum(sum),
+            Node::Unary(Unary::Negate, a) => self.dimension(a),
+            Node::Unary(Unary::Not, a) => {
+                self.dimension(a);
+                self.pure()
+            }
+            Node::Binary(op, a, b) => {
+                let (x, y) = (self.dimension(a), self.dimension(b));
+                self.operation(*op, expr, (a, x), (b, y))
+            }
+            Node::Call(Function::PowerOfAbs | Function::SignedPower, arguments) => {
+                match arguments.as_slice() {
+                    [a, b] => {
+                        let (x, y) = (self.dimension(a), self.dimension(b));
+                        self.operation(Binary::Power, expr, (a, x), (b, y))
+                    }
+                    _ => Dim::Unknown,
                 }
-                (Function::Sqrt, [a]) => dim(a).power(Some(0.5)),
-                (Function::PowerOfAbs | Function::SignedPower, [a, b]) => {
-                    dim(a).power(b.constant())
+            }
+            Node::Call(function, arguments) => {
+                let found: Vec<Dim> = arguments.iter().map(|a| self.dimension(a)).collect();
+                if found.iter().all(|dim| *dim == Dim::Bare) {
+                    return Dim::Bare;
                 }
-                _ => Dim::Known(Dimension::NONE),
-            },
-            Node::If(_, a, b) => dim(a).same(dim(b)),
+                let Some(row) = agreement(function.row().name) else { return Dim::Unknown };
+                let given: Vec<_> = (0..).zip(arguments).zip(found).collect();
+                let given = given.into_iter().map(|((k, a), dim)| (k, a, dim));
+                self.agree(row, expr, given.collect())
+            }
+            Node::If(condition, a, b) => {
+                self.dimension(condition);
+                let (x, y) = (self.dimension(a), self.dimension(b));
+                self.same(expr, (a, x), (b, y), |span, a, b| Clash::branches(span, a, b))
+            }
             Node::Table(..) => Dim::Unknown,
         }
     }
 
-    fn name_dimension(&self, path: &Path, own: Option<VertexId>) -> Dim {
-        match path.name.text.as_str() {
-            "pi" => return Dim::Bare,
-            "time" => return Dim::Known(SECOND),
-            name @ ("e" | "f" | "q" | "p") => {
-                let bond = own.and_then(|id| self.graph.vertex(id).bonds.first());
-                return bond.map_or(Dim::Unknown, |bond| self.bond_dimension(name, *bond));
+    /// A pure number.
+    fn pure(&self) -> Dim {
+        if self.strict { Dim::Known(Dimension::NONE) } else { Dim::Unknown }
+    }
+
+    /// Reports a clash, whose value is unknown.
+    pub fn clash(&mut self, make: impl FnOnce(&mut Scope<'a>) -> Clash) -> Dim {
+        if self.clashes.is_some() && self.strict {
+            let clash = make(self.scope);
+            if let Some(clashes) = &mut self.clashes {
+                clashes.push(clash);
             }
-            _ => {}
         }
-        match self.look_up_value(path).map(|(meaning, _)| meaning) {
-            Some(Meaning::Parameter(id)) => self.parameter_dimensions[id.index()],
+        Dim::Unknown
+    }
+
+    /// Two values that must be of one dimension.
+    fn same(
+        &mut self,
+        expr: &syntax::Expr,
+        (a, x): (&syntax::Expr, Dim),
+        (b, y): (&syntax::Expr, Dim),
+        say: impl FnOnce(Span, &Side, &Side) -> Clash,
+    ) -> Dim {
+        match (x, y) {
+            (Dim::Known(p), Dim::Known(q)) if p != q => self.clash(|scope| {
+                let (a, b) = (Side::of(scope, a, p), Side::of(scope, b, q));
+                say(expr.span, &a, &b).explain(&[&a, &b])
+            }),
+            (known @ Dim::Known(_), _) | (_, known @ Dim::Known(_)) => known,
+            (Dim::Bare, Dim::Bare) => Dim::Bare,
+            _ => Dim::Unknown,
+        }
+    }
+
+    fn operation(
+        &mut self,
+        op: Binary,
+        expr: &syntax::Expr,
+        (a, x): (&syntax::Expr, Dim),
+        (b, y): (&syntax::Expr, Dim),
+    ) -> Dim {
+        match op {
+            Binary::Add | Binary::Subtract => {
+                self.same(expr, (a, x), (b, y), |_, a, b| Clash::sum(op, a, b))
+            }
+            Binary::Multiply => x.times(y),
+            Binary::Divide => x.times(y.inverse()),
+            Binary::Power => self.power((a, x), (b, y)),
+            Binary::And | Binary::Or => self.pure(),
+            _ => {
+                self.same(expr, (a, x), (b, y), |_, a, b| Clash::comparison(a, b));
+                self.pure()
+            }
+        }
+    }
+
+    fn power(
+        &mut self,
+        (a, base): (&syntax::Expr, Dim),
+        (b, exponent): (&syntax::Expr, Dim),
+    ) -> Dim {
+        if let Dim::Known(found) = exponent
+            && !found.is_none()
+        {
+            return self.clash(|scope| {
+                let side = Side::of(scope, b, found);
+                Clash::exponent(&side).explain(&[&side])
+            });
+        }
+        let constant = b.constant().and_then(fraction);
+        match (base, constant) {
+            (Dim::Known(base), Some((n, d))) if !base.is_none() => Dim::of(base.power(n, d)),
+            // What the power of a metre with a changing exponent is, nobody can say.
+            (Dim::Known(found), None) if !found.is_none() => {
+                let varying = self.varies(b);
+                if !varying {
+                    return Dim::Unknown;
+                }
+                self.clash(|scope| {
+                    let side = Side::of(scope, a, found);
+                    Clash::base(&side, b.span).explain(&[&side])
+                })
+            }
+            (Dim::Bare, Some(_)) => Dim::Bare,
+            (Dim::Bare | Dim::Known(_), _) => self.pure(),
+            (Dim::Unknown, _) => Dim::Unknown,
+        }
+    }
+
+    /// Whether an expression changes during a run.
+    fn varies(&mut self, expr: &syntax::Expr) -> bool {
+        let mut varies = false;
+        expr.leaves(&mut |leaf, _| {
+            varies |= match leaf {
+                syntax::Leaf::Quantity(..) | syntax::Leaf::Sum(_) => false,
+                syntax::Leaf::Name(path) => {
+                    !matches!(self.scope.value_of(path), Some(Meaning::Parameter(_)) | None)
+                        || path.text() == "time"
+                }
+                syntax::Leaf::Call(call) => call.name.text != "table",
+            };
+        });
+        varies
+    }
+
+    fn meet(&mut self, what: Open) -> Dim {
+        if let Some(open) = &mut self.open {
+            open.push(what);
+        }
+        Dim::Unknown
+    }
+
+    fn name(&mut self, path: &Path) -> Dim {
+        if path.members.is_empty() && path.name.indices.is_empty() {
+            let name = path.name.text.as_str();
+            match name {
+                "pi" if self.strict => return Dim::Bare,
+                "pi" => return Dim::Unknown,
+                "time" if self.strict => return Dim::Known(SECOND),
+                "time" => return Dim::Unknown,
+                _ => {}
+            }
+            if self.scope.variable(name).is_some() {
+                return if self.strict { Dim::Bare } else { Dim::Unknown };
+            }
+            // Numbered ones are those of a field; elsewhere they are names like others.
+            if let Some((what, port)) = own_variable(name)
+                && let Some(id) = self.own
+                && (name.len() == 1
+                    || self.scope.graph.vertex(id).bonds.len() > 1
+                    || self.scope.value(name).is_none())
+            {
+                let bond = self.scope.graph.vertex(id).bonds.get(port).copied();
+                return bond.map_or(Dim::Unknown, |bond| self.bond(what, bond));
+            }
+        }
+        let meaning = self.scope.value_of(path);
+        self.meaning(meaning)
+    }
+
+    /// The dimension of the parameter or signal of an element's name.
+    pub fn named(&mut self, part: &syntax::Part) -> Dim {
+        let meaning = self.scope.key(part).and_then(|key| self.scope.value(&key));
+        self.meaning(meaning)
+    }
+
+    fn meaning(&mut self, meaning: Option<Meaning>) -> Dim {
+        match meaning {
+            Some(Meaning::Parameter(id)) => match self.scope.parameter_dimensions[id.index()] {
+                Dim::Unknown => self.meet(Open::Parameter(id)),
+                known => known,
+            },
             Some(Meaning::Signal(id)) => {
-                self.signal_dimensions.get(id.index()).copied().unwrap_or(Dim::Unknown)
+                match self.scope.signal_dimensions.get(id.index()).copied() {
+                    None | Some(Dim::Unknown) => self.meet(Open::Signal(id)),
+                    Some(known) => known,
+                }
             }
             None => Dim::Unknown,
         }
     }
 
-    /// The dimension of a variable of a bond, from its domain.
-    pub fn bond_dimension(&self, what: &str, bond: BondId) -> Dim {
-        let domain = self.graph.bond(bond).domain;
-        if domain == Domain::Any {
-            return Dim::Unknown;
+    /// A sum is of the unit of its terms.
+    fn sum(&mut self, sum: &syntax::Sum) -> Dim {
+        let bound = |walk: &mut Self, expr| walk.scope.integer(expr, "a bound", &mut vec![]);
+        let (from, to) = (bound(self, &sum.range.0), bound(self, &sum.range.1));
+        let (Some(from), Some(to)) = (from, to) else { return Dim::Unknown };
+        let before = self.scope.here;
+        let name: std::rc::Rc<str> = sum.variable.text.as_str().into();
+        let mut found = Dim::Bare;
+        for value in from..=to.min(from.saturating_add(MOST_TERMS)) {
+            let top = self.scope.rounds.len();
+            self.scope.here.round = Some(top as u32);
+            self.scope.rounds.push(Round { name: name.clone(), value, outer: before.round });
+            let term = self.dimension(&sum.term);
+            let terms = ((&sum.term, found), (&sum.term, term));
+            let sides = self.same(&sum.term, terms.0, terms.1, |_, a, b| Clash::terms(value, a, b));
+            self.scope.rounds.truncate(top);
+            self.scope.here = before;
+            let clash = found.known().is_some() && term.known().is_some() && sides == Dim::Unknown;
+            if clash {
+                return Dim::Unknown;
+            }
+            found = if value == from { term } else { sides };
         }
-        let row = domain.row();
-        Dim::of(match what {
-            "e" => Some(row.effort_dimension),
-            "f" => Some(row.flow_dimension),
-            "q" => row.flow_dimension.times(SECOND),
-            "p" => row.effort_dimension.times(SECOND),
-            _ => row.effort_dimension.times(row.flow_dimension),
-        })
+        found
     }
 
-    fn call_dimension(&self, call: &Call, own: Option<VertexId>) -> Dim {
-        let argument = |name: &str, position: usize| {
-            let mut all = call.rows.iter().flatten();
-            let labelled = all.clone().find(|argument| {
-                argument.label.as_ref().is_some_and(|label| label.name.text == name)
+    /// A variable of a bond, from its domain.
+    pub fn bond(&mut self, what: &str, bond: BondId) -> Dim {
+        if !self.strict {
+            return Dim::Unknown;
+        }
+        match self.scope.graph.bond(bond).domain {
+            Domain::Any => self.meet(Open::Bond(bond)),
+            domain => Dim::of(variable_dimension(what, domain)),
+        }
+    }
+
+    fn call(&mut self, call: &Call, expr: &syntax::Expr) -> Dim {
+        let name = call.name.text.as_str();
+        if let "e" | "f" | "q" | "p" | "power" = name {
+            return match self.scope.read_bond(call) {
+                Some(bond) => self.bond(name, bond),
+                None => Dim::Unknown,
+            };
+        }
+        let Some(row) = agreement(name) else { return Dim::Unknown };
+        let mut given: Vec<(usize, &syntax::Expr)> = vec![];
+        let mut powers: Vec<i8> = vec![];
+        let whole = |argument: &'_ Argument| argument.label.is_none();
+        match row.form {
+            Form::Plain => {
+                for (k, argument) in call.rows.iter().flatten().enumerate() {
+                    let at = match &argument.label {
+                        None => Some(k),
+                        Some(label) => {
+                            row.arguments.iter().position(|(name, _)| *name == label.name.text)
+                        }
+                    };
+                    if let (Some(at), Value::Expr(value)) = (at, &argument.value) {
+                        given.push((at, value));
+                    }
+                }
+            }
+            Form::Rows => {
+                for points in &call.rows {
+                    for (k, argument) in points.iter().enumerate().filter(|(_, a)| whole(a)) {
+                        if let Value::Expr(value) = &argument.value {
+                            given.push((k, value));
+                        }
+                    }
+                }
+            }
+            Form::Table => {
+                for (k, argument) in call.rows.iter().flatten().enumerate() {
+                    match &argument.value {
+                        Value::Expr(value) if k == 0 => given.push((0, value)),
+                        Value::Matrix(rows) => {
+                            for points in rows {
+                                given.extend((0..).zip(points));
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            Form::Transfer => {
+                for (k, argument) in call.rows.iter().flatten().enumerate() {
+                    let at = match &argument.label {
+                        None => k,
+                        Some(label) => row
+                            .arguments
+                            .iter()
+                            .position(|(name, _)| *name == label.name.text)
+                            .unwrap_or(usize::MAX),
+                    };
+                    match &argument.value {
+                        Value::Expr(value) => given.push((at, value)),
+                        Value::Matrix(rows) => {
+                            let count = rows.iter().map(Vec::len).sum::<usize>();
+                            for (k, value) in rows.iter().flatten().enumerate() {
+                                given.push((at, value));
+                                powers.resize(given.len() - 1, 0);
+                                powers.push(i8::try_from(count - 1 - k).unwrap_or(0));
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        powers.resize(given.len(), 0);
+        let given = given.into_iter().zip(powers);
+        let mut found = vec![];
+        for ((at, value), power) in given {
+            // The coefficient of sⁿ, times sⁿ (in 1/s), is in the units of its polynomial.
+            let mut dim = self.dimension(value);
+            if power > 0
+                && let Dim::Known(known) = dim
+            {
+                let seconds = SECOND.power(-i64::from(power), 1);
+                dim = Dim::of(seconds.and_then(|seconds| known.times(seconds)));
+            }
+            found.push((at, value, dim));
+        }
+        self.agree(row, expr, found)
+    }
+
+    /// The value of a function whose arguments hang together; each with its position in the row.
+    fn agree(
+        &mut self,
+        row: &'static Agreement,
+        expr: &syntax::Expr,
+        given: Vec<(usize, &syntax::Expr, Dim)>,
+    ) -> Dim {
+        let mut relations = Relations::default();
+        let mut failed = false;
+        for (tag, (at, value, dim)) in given.iter().enumerate() {
+            let (Dim::Known(found), Some((name, formula))) = (dim, row.arguments.get(*at)) else {
+                continue;
+            };
+            let Err(mut wrong) = relations.insist(*formula, *found, tag) else { continue };
+            failed = true;
+            // An argument that is of the same unit shows it better than those from which it follows.
+            let alike = given[..tag].iter().position(|(at, _, dim)| {
+                let same = row.arguments.get(*at).is_some_and(|(_, other)| other == formula);
+                same && *dim == Dim::Known(wrong.expected)
             });
-            let found = labelled.or(all.nth(position).filter(|argument| argument.label.is_none()));
-            match found.map(|argument| &argument.value) {
-                Some(Value::Expr(expr)) => self.dimension(expr, own),
-                _ => Dim::Unknown,
+            if let Some(alike) = alike.filter(|_| !wrong.with.is_empty()) {
+                wrong.with = vec![alike];
             }
-        };
-        match call.name.text.as_str() {
-            what @ ("e" | "f" | "q" | "p" | "power") => {
-                self.read_bond(call).map_or(Dim::Unknown, |bond| self.bond_dimension(what, bond))
-            }
-            "integ" => argument("x", 0).whole().times(Dim::Known(SECOND)),
-            "lag" => argument("x", 0).whole(),
-            "pi" => {
-                let x = argument("x", 0).whole();
-                let proportional = x.times(argument("Kp", usize::MAX).whole());
-                let integral =
-                    x.times(argument("Ki", usize::MAX).whole()).times(Dim::Known(SECOND));
-                let limits =
-                    argument("lo", usize::MAX).whole().same(argument("hi", usize::MAX).whole());
-                proportional.same(integral).same(limits)
-            }
-            "step" => argument("before", 1).same(argument("after", 2)).whole(),
-            "ramp" => argument("slope", 1).whole().times(Dim::Known(SECOND)),
-            "pulse" => argument("low", 0).same(argument("high", 1)).whole(),
-            "sine" => argument("offset", 0).same(argument("amplitude", 1)).whole(),
-            "pwl" => call
-                .rows
-                .iter()
-                .filter_map(|row| match row.get(1).map(|argument| &argument.value) {
-                    Some(Value::Expr(y)) => Some(self.dimension(y, own)),
-                    _ => None,
-                })
-                .fold(Dim::Unknown, Dim::same)
-                .whole(),
-            "coulomb" => argument("F", 1).whole(),
-            "check" => argument("e", 0).whole().times(argument("Ron", 1).whole().inverse()),
-            "relief" => argument("e", 0).whole().times(argument("Ron", 2).whole().inverse()),
+            let (given, found) = (&given, *found);
+            self.clash(|scope| {
+                let side = Side::of(scope, value, found);
+                let with = wrong.with.iter().rev().filter_map(|tag| given.get(*tag));
+                let with: Vec<Side> = with
+                    .filter_map(|(_, value, dim)| Some(Side::of(scope, value, dim.known()?)))
+                    .collect();
+                let sides: Vec<&Side> = std::iter::once(&side).chain(&with).collect();
+                Clash::argument(row, name, expr.span, &sides, wrong.expected).explain(&sides)
+            });
+        }
+        if failed {
+            return Dim::Unknown;
+        }
+        match relations.of(row.result) {
+            Some(dimension) if self.strict || row.result != PURE => Dim::Known(dimension),
             _ => Dim::Unknown,
         }
     }
+}
+
+/// Terms of a sum that are looked at.
+const MOST_TERMS: i64 = 1000;
+
+const PURE: Formula = Formula { unknowns: [0; 3], seconds: 0 };
+
+/// The element's own variable of a name and its port from 0: `f`, `q2`.
+pub(super) fn own_variable(name: &str) -> Option<(&str, usize)> {
+    let (what, number) = name.split_at_checked(1)?;
+    if !matches!(what, "e" | "f" | "q" | "p") {
+        return None;
+    }
+    match number.is_empty() {
+        true => Some((what, 0)),
+        false => Some((what, number.parse::<usize>().ok()?.checked_sub(1)?)),
+    }
+}
+
+/// The dimension of a variable in a domain: e, f, q, p or power.
+pub(super) fn variable_dimension(what: &str, domain: Domain) -> Option<Dimension> {
+    let row = domain.row();
+    match what {
+        "e" => Some(row.effort_dimension),
+        "f" => Some(row.flow_dimension),
+        "q" => row.flow_dimension.times(SECOND),
+        "p" => row.effort_dimension.times(SECOND),
+        _ => row.effort_dimension.times(row.flow_dimension),
+    }
+}
+
+impl Scope<'_> {
+    /// The dimension of an expression that stands where the scope is; nothing is reported.
+    pub fn dimension(&mut self, expr: &syntax::Expr, own: Option<VertexId>) -> Dim {
+        Walk::new(self, own).dimension(expr)
+    }
 
     /// The bond that a reading reads, when it can be found without an error.
-    fn read_bond(&self, call: &Call) -> Option<BondId> {
+    pub(super) fn read_bond(&self, call: &Call) -> Option<BondId> {
         match &call.rows.first()?.first()?.value {
             Value::Bond(from, to) => {
                 let (from, to) = (self.look_up(from)?.thing, self.look_up(to)?.thing);
@@ -261,87 +533,23 @@ impl Scope<'_> {
                     Thing::Instance(_) => return None,
                 };
                 let bonds = &self.graph.vertex(id).bonds;
-                let second = found.rest.first().is_some_and(|member| member.text == "2");
-                bonds.get(usize::from(second)).copied()
+                let port = found.rest.first().and_then(|member| member.text.parse::<usize>().ok());
+                bonds.get(port.unwrap_or(1).checked_sub(1)?).copied()
             }
             _ => None,
         }
     }
 
-    /// What the arguments of an element tell of its bond: the dimension of a variable of it, or of a quotient.
-    pub fn clues(&self, id: VertexId) -> Vec<(Clue, Dimension)> {
-        let declaration = &self.declarations[id.index()];
-        let shape = declaration.element.shape;
-        let linear = match shape {
-            Shape::EffortSource => Clue::Effort,
-            Shape::FlowSource => Clue::Flow,
-            Shape::Dissipator => Clue::Resistance,
-            Shape::Compliance => Clue::Compliance,
-            Shape::Inertia => Clue::Inertia,
-            _ => return vec![],
-        };
-        let mut clues = vec![];
-        let mut add = |clue, dim: Dim| {
-            if let Dim::Known(dimension) = dim.whole() {
-                clues.push((clue, dimension));
-            }
-        };
-        let Some(arguments) = declaration.arguments.filter(|arguments| !arguments.is_empty())
-        else {
-            let meaning = self.key(declaration.name).and_then(|key| self.value(&key));
-            if let Some(Meaning::Parameter(parameter)) = meaning {
-                add(linear, self.parameter_dimensions[parameter.index()]);
-            }
-            return clues;
-        };
-        for argument in arguments {
-            let Value::Expr(value) = &argument.value else { continue };
-            let dim = self.dimension(value, Some(id));
-            let Some(label) = &argument.label else {
-                add(linear, dim);
-                continue;
-            };
-            let dim = if label.derivative { dim.whole().times(Dim::Known(SECOND)) } else { dim };
-            match label.name.text.as_str() {
-                "e" | "e0" => add(Clue::Effort, dim),
-                "f" | "f0" => add(Clue::Flow, dim),
-                "q" | "q0" => add(Clue::Charge, dim),
-                "p" | "p0" => add(Clue::Momentum, dim),
-                _ => {}
-            }
-        }
-        clues
+    /// What a name means among values, without errors.
+    pub(super) fn value_of(&self, path: &Path) -> Option<Meaning> {
+        self.look_up_value(path).map(|(meaning, _)| meaning)
     }
-}
 
-/// What a dimension is the dimension of.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Clue {
-    Effort,
-    Flow,
-    Charge,
-    Momentum,
-    /// e/f
-    Resistance,
-    /// q/e
-    Compliance,
-    /// p/f
-    Inertia,
-}
-
-impl Clue {
-    /// The dimension in a domain.
-    pub fn dimension(self, domain: Domain) -> Option<Dimension> {
-        let row = domain.row();
-        let (e, f) = (row.effort_dimension, row.flow_dimension);
-        match self {
-            Clue::Effort => Some(e),
-            Clue::Flow => Some(f),
-            Clue::Charge => f.times(SECOND),
-            Clue::Momentum => e.times(SECOND),
-            Clue::Resistance => e.over(f),
-            Clue::Compliance => f.times(SECOND)?.over(e),
-            Clue::Inertia => e.times(SECOND)?.over(f),
-        }
+    /// Whether the model in which names are looked up says any unit.
+    pub(super) fn has_units(&self) -> bool {
+        let with_units = self.units.by_body.get_or_init(|| {
+            self.bodies.iter().map(|body| says_units(body.header, body.statements)).collect()
+        });
+        with_units.get(self.frame().body).copied().unwrap_or(true)
     }
 }

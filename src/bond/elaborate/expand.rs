@@ -68,6 +68,7 @@ impl<'a> Scope<'a> {
             clock: 0,
             parameter_dimensions: vec![],
             signal_dimensions: vec![],
+            units: Default::default(),
         };
         scope.collect_bodies(program, d);
         scope.graph.name = scope.bodies.first().map_or(String::new(), |body| body.name.clone());

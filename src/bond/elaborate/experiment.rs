@@ -1,12 +1,13 @@
 //! What a plain run does: end, output interval, options.
 
 use super::Overrides;
+use super::dimensions::{Dim, SECOND};
 use super::scope::Scope;
 use crate::bond::graph::BondGraph;
 use crate::bond::syntax::{Expr as Syntax, parse_value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
-use crate::quantity::{Dimension, Unit};
+use crate::quantity::Dimension;
 use crate::source::Span;
 
 impl Scope<'_> {
@@ -49,13 +50,18 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<f64> {
         let seconds = self.number(value, what, d)?;
-        if let super::dimensions::Dim::Known(dimension) = self.dimension(value, None)
-            && dimension != super::dimensions::SECOND
+        if let Dim::Known(dimension) = self.checked_dimension(value, d)
+            && dimension != SECOND
         {
+            let found = dimension.describe(self.written_unit(value).as_deref());
             d.push(
-                Diagnostic::error("E0303", value.span, format!("{what} is no time"))
-                    .says(format!("its dimension is {dimension}"))
-                    .help("give it in seconds, as in `1.5 s`"),
+                Diagnostic::error(
+                    "E0303",
+                    value.span,
+                    format!("{what} is {found} instead of a time"),
+                )
+                .says(found)
+                .help("give it in a unit of time, as in `1.5 s`"),
             );
             return None;
         }
@@ -106,24 +112,18 @@ pub fn require_drives(graph: &BondGraph, d: &mut Vec<Diagnostic>) {
     }
 }
 
-/// The SI unit of a dimension in the words of engineers: `Pa`, `m^3/s`; empty for a pure number.
+/// The SI unit of a dimension for the head of a column; empty for a pure number. What may be a torque is taken for an
+/// energy.
 pub(super) fn si_text(dimension: Dimension) -> String {
-    const COMMON: &[&str] = &[
-        "m", "kg", "s", "A", "K", "V", "N", "Pa", "J", "W", "C", "Wb", "Ohm", "F", "H", "m/s",
-        "m^3/s", "m^3", "m^2", "rad/s", "N*s", "Pa*s", "W/K", "J/K", "kg/s", "m/s^2", "s^2", "K*s",
-        "A*s",
-    ];
-    if dimension.is_none() {
-        return String::new();
-    }
-    let same = |text: &&&str| Unit::parse(text).is_ok_and(|unit| unit.dimension == dimension);
-    match COMMON.iter().find(same) {
-        Some(text) => text.to_string(),
-        None => dimension.to_string(),
+    const ENERGY: Dimension = Dimension::new(2, 1, -2, 0, 0);
+    match dimension {
+        Dimension::NONE => String::new(),
+        ENERGY => "J".to_string(),
+        other => other.si(),
     }
 }
 
-/// The unit as written in a value, looking through a sign.
+/// Whether a value is a name alone, and this one.
 pub(super) fn is_name(value: &Syntax, name: &str) -> bool {
     matches!(&*value.node, Node::Leaf(crate::bond::syntax::Leaf::Name(path)) if path.text() == name)
 }

@@ -49,7 +49,7 @@ pub(super) enum Thing {
 }
 
 /// What a name of the space of values means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Meaning {
     Parameter(ParameterId),
     Signal(SignalId),

@@ -20,13 +20,21 @@ mod signals;
 mod regulators;
 mod laws;
 mod fields;
+mod agreements;
+mod has_units;
 mod dimensions;
+mod stated;
 mod domains;
+mod inference;
+mod clashes;
+mod checks;
 mod experiment;
 mod observe;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod units_tests;
 
 pub use expand::MOST_PARTS;
 pub use experiment::require_drives;
@@ -84,7 +92,6 @@ pub fn elaborate(
     let mut scope = scope::Scope::collect(program, map, &set, d);
     scope.join_bonds(d);
     scope.evaluate_parameters(d);
-    scope.infer_domains();
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
     scope.set_experiment(overrides, d);

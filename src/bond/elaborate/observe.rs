@@ -10,7 +10,7 @@ use crate::bond::graph::*;
 use crate::bond::syntax::{Expr as Syntax, ObserveItem, parse_observe};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node};
-use crate::quantity::Domain;
+use crate::quantity::{Dimension, Domain, Unit};
 use crate::source::Span;
 use std::collections::{HashMap, HashSet};
 
@@ -42,11 +42,13 @@ impl Scope<'_> {
 
     /// Notes the units of signals that are known.
     fn note_units(&mut self) {
+        // There are many signals and few dimensions.
+        let mut units: HashMap<Dimension, Unit> = HashMap::new();
         for (signal, dim) in self.graph.signals.iter_mut().zip(&self.signal_dimensions) {
-            if let Dim::Known(dimension) = dim {
-                let text = si_text(*dimension);
-                let dimension = *dimension;
-                signal.unit = Some(crate::quantity::Unit { text, factor: 1.0, dimension });
+            if let Dim::Known(dimension) = *dim {
+                let unit = units.entry(dimension);
+                let make = || Unit { text: si_text(dimension), factor: 1.0, dimension };
+                signal.unit = Some(unit.or_insert_with(make).clone());
             }
         }
     }
@@ -104,27 +106,24 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<Observation> {
         let lowered = self.lower(&item.expr, Place::observed(), d);
-        let dim = self.dimension(&item.expr, None).whole();
+        let dim = self.checked_dimension(&item.expr, d).whole();
         let unit = match &item.unit {
             None => (String::new(), 1.0),
             Some((unit, span)) => {
                 if let Dim::Known(dimension) = dim
                     && dimension != unit.dimension
                 {
-                    let si = si_text(dimension);
-                    let si = if si.is_empty() {
-                        "a pure number".to_string()
-                    } else {
-                        format!("in {si}")
-                    };
+                    let found = dimension.describe(self.written_unit(&item.expr).as_deref());
+                    let asked = unit.dimension.describe(Some(&unit.text));
                     d.push(
                         Diagnostic::error(
                             "E0303",
                             *span,
-                            format!("`{}` is not a unit of what is observed", unit.text),
+                            format!("what is observed is {found}, not {asked}"),
                         )
-                        .says(format!("a unit of dimension {}", unit.dimension))
-                        .label(item.expr.span, format!("this is {si}")),
+                        .says(format!("a unit of {asked}"))
+                        .label(item.expr.span, format!("this is {found}"))
+                        .help(format!("observe it in a unit like {}", dimension.si())),
                     );
                     return None;
                 }

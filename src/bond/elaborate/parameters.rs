@@ -20,17 +20,16 @@ impl Scope<'_> {
             self.demand(k, d);
         }
         self.parameter_dimensions = vec![Dim::Unknown; self.parameters.len()];
-        self.infer_parameter_dimensions();
         for at in 0..self.set.len() {
             self.check_setting(at, d);
         }
     }
 
-    /// What the command line sets must be a parameter's, and of its dimension.
+    /// What the command line sets must be a parameter's; its unit is checked where all units are.
     fn check_setting(&mut self, at: usize, d: &mut Vec<Diagnostic>) {
         let setting = &self.set[at];
-        let (name, text) = (setting.name, setting.text);
-        let Some(id) = setting.taken else {
+        let name = setting.name;
+        if setting.taken.is_none() {
             let error = Diagnostic::error(
                 "E0223",
                 Span::NONE,
@@ -52,27 +51,6 @@ impl Scope<'_> {
                 (_, _, Some(meant)) => did_you_mean(error, Span::NONE, meant),
                 _ => error,
             });
-            return;
-        };
-        let (Some(value), setting) = (setting.value, &self.set[at]) else { return };
-        let dimension = self.dimension(value, None);
-        let declared = match setting.declared {
-            Some(valued) => self.at(valued.here, |scope| scope.dimension(valued.value, None)),
-            None => Dim::Unknown,
-        };
-        if let (Dim::Known(declared), Dim::Known(given)) = (declared, dimension)
-            && declared != given
-        {
-            let parameter = &self.graph.parameters[id.index()];
-            d.push(
-                Diagnostic::error(
-                    "E0303",
-                    Span::NONE,
-                    format!("`{text}` is not a value for `{}`", parameter.name),
-                )
-                .label(parameter.span, format!("its dimension is {declared}"))
-                .because(format!("the dimension of `{text}` is {given}")),
-            );
         }
     }
 

@@ -89,6 +89,8 @@ pub(super) struct Scope<'a> {
     pub parameter_dimensions: Vec<super::dimensions::Dim>,
     /// The dimension of each signal, as far as known.
     pub signal_dimensions: Vec<super::dimensions::Dim>,
+    /// What else is known of units.
+    pub units: super::inference::Units<'a>,
 }
 
 /// How far the evaluation of a parameter has come.

@@ -1,6 +1,8 @@
 //! Signals: their laws, the hidden ones that functions with memory bring along, and loops.
 
+use super::frames::Here;
 use super::functions::{self, Signature};
+use super::inference::Source;
 use super::scope::{Meaning, Scope, Valued, did_you_mean};
 use super::value::Place;
 use crate::bond::graph::*;
@@ -22,7 +24,7 @@ impl Scope<'_> {
         }
         self.drive_inputs(drives, d);
         self.check_outputs(d);
-        self.infer_signal_dimensions();
+        self.check_units(d);
         self.find_loops(d);
         self.make_regulators(d);
         self.sort_signals();
@@ -80,6 +82,7 @@ impl Scope<'_> {
         for (name, valued) in &drives {
             let here = valued.here;
             let Some(id) = self.at(here, |scope| scope.input(name, d)) else { continue };
+            self.units.drives.push((id, Source::Written(valued.value, here)));
             if self.signals.get(id.index()).is_some_and(Option::is_some) {
                 // The instance says what this input gets.
                 continue;
@@ -113,6 +116,7 @@ impl Scope<'_> {
                 if let Some(law) = self.signal_law(id, &value, statement, d) {
                     self.graph.signals[id.index()].law = law;
                 }
+                self.units.drives.push((id, Source::Given(value.into(), Here::ROOT)));
             }
             for error in &mut d[before..] {
                 error.notes.push(format!("in the drive that was given: {text}"));
@@ -286,6 +290,7 @@ impl Scope<'_> {
         let dimensions = order.iter().map(|old| self.signal_dimensions[*old]).collect();
         self.signal_dimensions = dimensions;
         self.signal_order.sort_unstable();
+        self.units.renumber(&place);
         for frame in &mut self.frames {
             for meaning in frame.values.values_mut() {
                 if let Meaning::Signal(id) = meaning {

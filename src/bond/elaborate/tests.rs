@@ -575,7 +575,7 @@ fn overrides_of_the_command_line() {
     let codes: Vec<&str> = built.d.iter().map(|d| d.code).collect();
     assert_eq!(
         codes,
-        ["E0301", "E0223", "E0303", "E0223", "E0219", "E0104", "E0226", "E0206"],
+        ["E0301", "E0223", "E0223", "E0219", "E0104", "E0303", "E0226", "E0206"],
         "\n{}",
         built.lines().join("\n")
     );
