@@ -342,6 +342,63 @@ fn a_port_in_derivative_causality_is_no_state() {
     against(text, &exact);
 }
 
+/// A gyrator written as a field passes causality on as a gyrator does.
+#[test]
+fn a_field_that_only_converts_constrains_causality() {
+    let strokes = |field: &str, first: &str, second: &str| {
+        let text = format!(
+            "{field}
+            {first}:x(1) -> g.1
+            {second}:y(1) -> g.2
+            simulate until 1 step 0.1"
+        );
+        let mut map = SourceMap::default();
+        let file = map.add("field.bg", text);
+        let mut d = vec![];
+        let syntax = parse(&map, file, &mut d);
+        let graph = elaborate(&syntax.into(), &map, &Overrides::default(), &mut d).unwrap();
+        let causality = assign(&graph, &mut d);
+        (causality.map(|causality| causality.order), d)
+    };
+    // An effort on one side is a flow on the other: the inertia there is in derivative causality.
+    for (field, first, second, order) in [
+        ("R:g([0, 2; -2, 0])", "Se", "I", 0),
+        ("R:g([0, 2; -2, 0])", "Sf", "I", 1),
+        ("R:g([0.1, 2; -2, 0])", "Se", "I", 1),
+        ("R:g(e1 = 2*e2, f2 = -2*f1)", "Se", "I", 1),
+        ("R:g(e1 = 2*e2, f2 = -2*f1)", "Sf", "I", 0),
+    ] {
+        // Only the source has a value of its own here.
+        let (found, d) = strokes(field, first, second);
+        assert_eq!(found, Some(order), "{field} {first} {second} {d:#?}");
+    }
+    let (found, d) = strokes("R:g([0, 2; -2, 0])", "Se", "Sf");
+    assert!(found.is_none());
+    let conflict = d.iter().find(|d| d.code == "E0406").unwrap();
+    assert!(conflict.message.contains("two ports of R:g"), "{conflict:#?}");
+}
+
+#[test]
+fn an_initial_effort_needs_one_charge() {
+    let said = |initial: &str| {
+        let text = format!(
+            "C:plate(e1 = q1*(1 + q2)/2, e2 = q1^2/4, {initial})
+            Sf:none(0) -> plate.1
+            plate.2 -> R:r(1)
+            simulate until 1 step 0.1"
+        );
+        run_text("plate.bg", &text, &Overrides::default()).map(|_| ()).map_err(|d| d[0].clone())
+    };
+    assert!(said("e1_0 = 3, q2_0 = 1").is_ok());
+    // A force that q1 alone makes: no q2 gives it.
+    let error = said("q1_0 = 1, e2_0 = 3").unwrap_err();
+    assert_eq!(error.code, "E0503");
+    assert!(error.message.contains("no q gives plate.2 the e2_0 = 3"), "{error:#?}");
+    // With a gap of −1 every charge has the effort 0.
+    let error = said("e1_0 = 0, q2_0 = -1").unwrap_err();
+    assert!(error.message.contains("more than one q gives plate.1"), "{error:#?}");
+}
+
 /// A field may have one port, which needs no number.
 #[test]
 fn a_field_of_one_port_is_a_storage() {

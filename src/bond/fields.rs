@@ -17,7 +17,9 @@
 //! Methodology*, 2010, ch. 2.
 
 use super::consistent::random_sign;
-use super::graph::{BondGraph, End, Expr, Field, Law, Leaf, Storage, StoreLaw, VertexId};
+use super::graph::{
+    BondGraph, Dissipation, End, Expr, Field, Law, Leaf, Storage, StoreLaw, VertexId,
+};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Dag, NodeId, Program};
 use crate::linear::symmetric::least_eigenvalue;
@@ -78,6 +80,26 @@ pub fn is_state_function(graph: &BondGraph, id: VertexId) -> bool {
         None => field.ports.iter().for_each(|law| law.expressions(&mut |law| look(law, false))),
     }
     alone && (field.matrix.is_some() || clash(graph, id, field).is_none())
+}
+
+/// Whether an R field of two ports only converts: neither law speaks of its own port, so that what is imposed on one port
+/// decides what may be imposed on the other. `Some(true)`: efforts on both or on none, as through a gyrator;
+/// `Some(false)`: on one, as through a transformer.
+pub fn converts(graph: &BondGraph, id: VertexId) -> Option<bool> {
+    let Law::Field(field) = &graph.vertex(id).law else { return None };
+    let [Law::Dissipator(first), Law::Dissipator(second)] = field.ports.as_slice() else {
+        return None;
+    };
+    let mut own = false;
+    for (law, bond) in field.ports.iter().zip(&graph.vertex(id).bonds) {
+        law.expressions(&mut |law| {
+            law.leaves(&mut |leaf, _| {
+                own |= matches!(leaf, Leaf::Bond { bond: other, .. } if other == bond);
+            });
+        });
+    }
+    let gives_effort = |law: &Dissipation| !matches!(law, Dissipation::Flow(_));
+    (!own).then(|| gives_effort(first) == gives_effort(second))
 }
 
 /// Two ports whose slopes differ.

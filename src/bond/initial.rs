@@ -17,6 +17,7 @@ use super::roots::roots;
 use super::structure::{Constraint, Structure};
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
+use std::collections::HashMap;
 
 /// Values at t = 0+, all in SI.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -194,7 +195,17 @@ fn say(
                         let value = number(expr);
                         match stored_of_power(graph, law, value) {
                             Inverse::Value(value) => Said::Value { value, stated: true },
-                            Inverse::Modulated => Said::Power { column, value: sign * value },
+                            Inverse::Modulated => {
+                                match roots_at_port(graph, end, law, value).as_deref() {
+                                    // Where Newton's method begins.
+                                    Some([root]) => y[k] = *root,
+                                    Some(found) => {
+                                        d.push(no_unique_root(graph, end, *kind, value, found));
+                                    }
+                                    None => {}
+                                }
+                                Said::Power { column, value: sign * value }
+                            }
                             Inverse::Roots(found) => {
                                 d.push(no_unique_root(graph, end, *kind, value, &found));
                                 Said::Value { value: 0.0, stated: true }
@@ -283,6 +294,43 @@ fn stored_of_power(graph: &BondGraph, law: &StoreLaw, power: f64) -> Inverse {
     }
 }
 
+/// Where the law of a field's port has a value, over what that port stores, the others being as stated; `None` where the
+/// law speaks of anything else or another port starts from its power variable too.
+fn roots_at_port(graph: &BondGraph, end: End, law: &StoreLaw, power: f64) -> Option<Vec<f64>> {
+    let StoreLaw::OfStored(law) = law else { return None };
+    let mut others = vec![];
+    let mut alone = true;
+    law.leaves(&mut |leaf, _| match leaf {
+        Leaf::Parameter(_) => {}
+        Leaf::Stored(other) if other.vertex == end.vertex => others.push(*other),
+        _ => alone = false,
+    });
+    let number = |expr: &Expr| {
+        expr.evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => graph.parameters[id.index()].value,
+            _ => f64::NAN,
+        })
+    };
+    let stated = |other: End| match graph.law_at(other) {
+        _ if other == end => Some(f64::NAN),
+        Law::Store { initial: StoreInitial::Stored(value), .. } => Some(number(value)),
+        Law::Store { initial: StoreInitial::Unstated, .. } => Some(0.0),
+        _ => None,
+    };
+    let others: HashMap<End, f64> = others
+        .into_iter()
+        .map(|other| Some((other, stated(other)?)))
+        .collect::<Option<_>>()
+        .filter(|_| alone)?;
+    Some(roots(&|x| {
+        law.evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => graph.parameters[id.index()].value,
+            Leaf::Stored(other) if *other != end => others.get(other).copied().unwrap_or(0.0),
+            _ => x,
+        }) - power
+    }))
+}
+
 fn power_of_stored(graph: &BondGraph, law: &StoreLaw, stored: f64) -> Option<f64> {
     match law {
         StoreLaw::Linear(value) => Some(stored / own_law(graph, value)?(0.0)),
@@ -304,13 +352,18 @@ fn no_unique_root(
 ) -> Diagnostic {
     let (span, name) = (graph.vertex(end.vertex).span, graph.port_name(end));
     let (power, stored) = letters(kind);
+    // As the file writes the initial values of one-ports, and of a field's ports.
+    let number = match graph.vertex(end.vertex).law {
+        Law::Field(_) => format!("{}_0", end.port + 1),
+        _ => "0".to_string(),
+    };
     let message = if found.is_empty() {
-        format!("no {stored} gives {name} the {power}0 = {value}")
+        format!("no {stored} gives {name} the {power}{number} = {value}")
     } else {
-        format!("more than one {stored} gives {name} the {power}0 = {value}")
+        format!("more than one {stored} gives {name} the {power}{number} = {value}")
     };
     let mut diagnostic = Diagnostic::error("E0503", span, message)
-        .help(format!("state {stored}0 instead of {power}0"));
+        .help(format!("state {stored}{number} instead of {power}{number}"));
     if !found.is_empty() {
         let list: Vec<String> = found.iter().take(5).map(|root| format!("{root:.6}")).collect();
         diagnostic = diagnostic.because(format!("{stored} = {}", list.join(", ")));

@@ -6,6 +6,7 @@
 //! leads to a contradiction is turned round; where both ways do, the latest choice that took part in it is (conflict-directed
 //! backjumping; Prosser, 1993). A contradiction that no choice takes part in is a conflict of what the graph says.
 
+use super::super::fields;
 use super::super::graph::*;
 use super::{Causality, Conflict, is_modulated, stroke_for};
 use std::collections::VecDeque;
@@ -263,6 +264,11 @@ impl<'a> Assignment<'a> {
                 Law::Zero | Law::One => self.junction(vertex)?,
                 Law::Transformer(_) => self.two_port(vertex, false)?,
                 Law::Gyrator(_) => self.two_port(vertex, true)?,
+                Law::Field(_) => {
+                    if let Some(alike) = fields::converts(self.graph, vertex) {
+                        self.two_port(vertex, alike)?;
+                    }
+                }
                 _ => {}
             }
         }

@@ -163,6 +163,10 @@ fn tell_conflict(graph: &BondGraph, conflict: &Conflict) -> Diagnostic {
             format!("{who} impose what excludes each other on the two ports of {place}"),
             "a transformer passes effort one way and flow the other, a gyrator turns one into the other",
         ),
+        Law::Field(_) if several => (
+            format!("{who} impose what excludes each other on the two ports of {place}"),
+            "neither of its laws speaks of its own port: what is imposed on one port decides what may be imposed on the other",
+        ),
         Law::Source { .. } | Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_)
             if !several =>
         {
