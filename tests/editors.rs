@@ -114,7 +114,7 @@ fn grammar() -> Value {
             { "name": "keyword.operator.arrow.bg", "match": r"->\||\|->|->" },
             {
                 "comment": "a number with its unit",
-                "match": format!("{begin}({number})(?: ?({unit}))?"),
+                "match": format!(r"(?:{begin}|(?<=\.\.))({number})(?: ?({unit}))?"),
                 "captures": {
                     "1": { "name": "constant.numeric.bg" },
                     "2": { "name": "keyword.other.unit.bg" }

@@ -116,6 +116,17 @@ impl Analysis {
 
     /// A span in the protocol's terms.
     pub fn range(&self, span: Span) -> lsp_types::Range {
-        super::position::range(self.text(span.file), span.start as usize..span.end as usize)
+        let start = self.position(span.file, span.start as usize);
+        lsp_types::Range { start, end: self.position(span.file, span.end.max(span.start) as usize) }
+    }
+
+    /// The place of a byte; the map knows where lines begin, so that a long text need not be gone through.
+    fn position(&self, file: FileId, byte: usize) -> lsp_types::Position {
+        let text = self.text(file);
+        let byte = super::position::floor(text, byte);
+        let line = self.map.position(Span::new(file, byte, byte)).map_or(1, |(line, _)| line);
+        let begin = text[..byte].rfind('\n').map_or(0, |at| at + 1);
+        let character = super::position::units(&text[begin..byte]) as u32;
+        lsp_types::Position { line: line.saturating_sub(1) as u32, character }
     }
 }

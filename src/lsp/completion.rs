@@ -5,6 +5,7 @@ use super::context::{Context, context};
 use super::index::{BodyId, Index, Sort, Symbol};
 use super::words;
 use crate::bond::elements::{ELEMENTS, element};
+use crate::bond::syntax::{Argument, Value};
 use crate::quantity::{DOMAINS, PREFIXES, SYMBOLS};
 use crate::sim::OPTIONS;
 use crate::source::{FileId, library, loader};
@@ -172,9 +173,9 @@ fn members(index: &Index, body: Option<BodyId>, path: &[String], thing: bool, of
             return;
         };
         if let Sort::Element(kind) = &index.symbol(id).sort {
-            let two_port = element(kind).is_some_and(|row| row.shape.is_two_port());
-            for port in ["1", "2"].iter().filter(|_| two_port && thing) {
-                offer.add(port, Kind::INTERFACE, "port", "");
+            let arguments = index.symbol(id).arguments.as_deref().unwrap_or(&[]);
+            for port in (1..=ports(kind, arguments)).filter(|_| thing) {
+                offer.add(&port.to_string(), Kind::INTERFACE, "port", "");
             }
             return;
         }
@@ -196,6 +197,23 @@ fn members(index: &Index, body: Option<BodyId>, path: &[String], thing: bool, of
     inner.filter(|symbol| matches!(symbol.sort, Sort::Instance(_))).for_each(|symbol| {
         offer.symbol(index, symbol);
     });
+}
+
+/// How many numbered ports an element has: two of a two-port, as many as its laws or its matrix say of a field.
+fn ports(kind: &str, arguments: &[Argument]) -> usize {
+    if element(kind).is_some_and(|row| row.shape.is_two_port()) {
+        return 2;
+    }
+    let numbered = arguments.iter().map(|argument| match (&argument.label, &argument.value) {
+        (Some(label), _) => {
+            let digits = label.name.text.trim_start_matches(['e', 'f', 'q', 'p']);
+            // `q0` is an initial value.
+            digits.parse().ok().filter(|port| *port < 1000).unwrap_or(0)
+        }
+        (None, Value::Matrix(rows)) => rows.len(),
+        (None, _) => 0,
+    });
+    numbered.max().unwrap_or(0)
 }
 
 /// Labels of arguments: a model's parameters and inputs, an element's initial values and laws.

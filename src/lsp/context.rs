@@ -56,7 +56,9 @@ pub fn context(text: &str, byte: usize) -> (Context, usize) {
         }
         Within::Code => {}
     }
-    let word = before.len() - tail_word(before).len();
+    // No name begins with a digit: what follows digits at once is a unit.
+    let word =
+        before.len() - tail_word(before).trim_start_matches(|c: char| c.is_ascii_digit()).len();
     let head = &before[scan.statement..word];
     let context = unit(head, before, word)
         .or_else(|| member(head, &scan, before))
@@ -129,9 +131,7 @@ fn unit(head: &str, before: &str, word: usize) -> Option<Context> {
     let number =
         digits.len() < near.len() && near.ends_with(|c: char| c.is_ascii_digit() || c == '.');
     // The digits of a name, of a member and of a range are no number.
-    let plain = !digits.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ']')
-        && !near[digits.len()..].starts_with('.')
-        && !near.ends_with("..");
+    let plain = !digits.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ']');
     let exponent = digits
         .strip_suffix(['e', 'E'])
         .or_else(|| digits.strip_suffix(['-', '+'])?.strip_suffix(['e', 'E']))

@@ -56,6 +56,8 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("clamp", "x, held between lo and hi"),
     ("floor", "the largest whole number not above x"),
     ("mod", "the rest of x by y, with the sign of y"),
+    ("abspow", "|x|^y"),
+    ("signpow", "|x|^y with the sign of x"),
     ("sum", "a sum over whole numbers: sum(k in 1..N, x[k])"),
     ("step", "`before` until t0, then `after`"),
     ("ramp", "0 until t0, then slope·(t − t0)"),
