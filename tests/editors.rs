@@ -154,11 +154,12 @@ fn the_grammar_of_colours_follows_the_tables() {
         std::fs::write(&path, &wanted).unwrap();
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    let line = found.lines().zip(wanted.lines()).find(|(a, b)| a != b);
+    let line = found.lines().zip(wanted.lines()).position(|(a, b)| a != b);
     assert!(
         found == wanted,
-        "UPDATE=1 cargo test --test editors writes {} anew: {line:?}",
-        path.display()
+        "UPDATE=1 cargo test --test editors writes {}:{} anew",
+        path.display(),
+        line.unwrap_or(0) + 1
     );
 }
 
