@@ -22,8 +22,10 @@ pub const BLOCK_WORDS: &[&str] = &["model", "for", "if"];
 pub struct Scan<'a> {
     file: FileId,
     text: &'a str,
-    tokens: Vec<Token>,
+    pub(super) tokens: Vec<Token>,
     masked: String,
+    /// `{` that are more than the `}`.
+    unclosed: i64,
 }
 
 /// One statement's text, or that of a block's head.
@@ -54,7 +56,17 @@ impl<'a> Scan<'a> {
     /// Cuts a text into tokens.
     pub fn new(file: FileId, text: &'a str) -> Scan<'a> {
         let (tokens, masked) = cut(text);
-        Scan { file, text, tokens, masked }
+        let unclosed = tokens.iter().fold(0, |count, token| match token.kind {
+            Kind::Open(b'{') => count + 1,
+            Kind::Close(b'}') => count - 1,
+            _ => count,
+        });
+        Scan { file, text, tokens, masked, unclosed }
+    }
+
+    /// Whether the file has fewer `}` than `{`.
+    pub fn lacks_braces(&self) -> bool {
+        self.unclosed > 0
     }
 
     /// The text as it is.
@@ -87,8 +99,13 @@ impl<'a> Scan<'a> {
         self.masked.get(span.start as usize..span.end as usize).unwrap_or("")
     }
 
+    /// The first token that begins at a byte or after it.
+    pub fn token_at(&self, byte: u32) -> usize {
+        self.tokens.partition_point(|token| token.start < byte)
+    }
+
     /// The first token at or after `from` that says something.
-    fn significant(&self, from: usize) -> Option<usize> {
+    pub fn significant(&self, from: usize) -> Option<usize> {
         let rest = self.tokens.get(from..)?;
         rest.iter().position(Token::says_something).map(|skipped| from + skipped)
     }
