@@ -675,6 +675,104 @@ fn a_mend_is_offered_and_mends() {
 }
 
 #[test]
+fn a_text_is_laid_out_as_fmt_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut client = Client::new(folder.path());
+    let file = uri(&folder.path().join("wild.bg"));
+    let text = "# 🚀\n  Se:U( 10 V )->1:Φ   # Φ\nΦ->R:R(2   ),C:C( 1 mF)\n";
+    client.open(&file, text);
+    let mut format = |client: &mut Client| {
+        let options = json!({ "tabSize": 2, "insertSpaces": true });
+        let params = json!({ "textDocument": { "uri": file }, "options": options });
+        client.ask("textDocument/formatting", params)
+    };
+    let edits = format(&mut client);
+    let new = applied(text, &edits);
+    assert!(new != text && new.contains("Se:U(10 V) -> 1:Φ"), "{new}");
+    std::fs::write(folder.path().join("wild.bg"), text).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_bondspice"))
+        .args(["fmt", "wild.bg"])
+        .current_dir(folder.path())
+        .status();
+    assert!(done.unwrap().success());
+    assert_eq!(std::fs::read_to_string(folder.path().join("wild.bg")).unwrap(), new);
+    // What is in order stays as it is, and so does what cannot be read.
+    client.change(&file, 2, &new);
+    assert_eq!(format(&mut client), json!([]));
+    client.change(&file, 3, "Se:U(->");
+    assert_eq!(format(&mut client), json!([]));
+    client.close();
+}
+
+#[test]
+fn colours_follow_the_meaning() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut client = Client::silent();
+    let answer = client.ask("initialize", json!({ "capabilities": {} }));
+    let legend = answer["capabilities"]["semanticTokensProvider"]["legend"]["tokenTypes"].clone();
+    let file = uri(&folder.path().join("colours.bg"));
+    let text = "# 🚀 Φ\nparam Φ = 2 mH \"🚀\" # c\nSe:U(step(0 s, 0, Φ)) -> 1:step\n";
+    client.open(&file, text);
+    let found =
+        client.ask("textDocument/semanticTokens/full", json!({ "textDocument": { "uri": file } }));
+    let numbers: Vec<u64> =
+        found["data"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+    let (mut line, mut column) = (0, 0);
+    let mut coloured = vec![];
+    for token in numbers.chunks(5) {
+        column = if token[0] == 0 { column + token[1] } else { token[1] };
+        line += token[0];
+        let at = |column: u64| json!({ "line": line, "character": column });
+        let range = json!({ "start": at(column), "end": at(column + token[2]) });
+        let sort = legend[token[3] as usize].as_str().unwrap();
+        coloured.push(format!("{} {sort}", slice(text, &range)));
+    }
+    for wanted in [
+        "# 🚀 Φ comment",
+        "param keyword",
+        "Φ variable",
+        "2 number",
+        "mH macro",
+        "\"🚀\" string",
+        "# c comment",
+        "Se type",
+        "step function",
+        "step variable",
+        "-> operator",
+        "1 type",
+    ] {
+        assert!(coloured.iter().any(|token| token == wanted), "{wanted} in {coloured:?}");
+    }
+    client.close();
+}
+
+#[test]
+fn files_of_the_library_are_shown_and_not_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut client = Client::new(folder.path());
+    let (name, text) = bondspice::source::library::LIBRARY[0];
+    let model = text.lines().find_map(|line| line.strip_prefix("model ")).expect(name);
+    let model = model.split('(').next().unwrap().trim();
+    let file = uri(&folder.path().join("user of it.bg"));
+    let source = format!("import \"std/{name}\"\n{model}:part\n");
+    client.open(&file, &source);
+    let at = place(
+        &file.replace(' ', "%20"),
+        &source,
+        &format!("\n{}|{}:part", &model[..1], &model[1..]),
+    );
+    let found = client.ask("textDocument/definition", at.clone());
+    let target = found[0]["uri"].as_str().unwrap().strip_prefix("file://").unwrap();
+    assert_eq!(std::fs::read_to_string(target).unwrap(), text);
+    assert!(std::fs::metadata(target).unwrap().permissions().readonly());
+    let mut rename = at;
+    rename["newName"] = json!("Mine");
+    let (_, reason) = client.refused("textDocument/rename", rename);
+    assert!(reason.contains("belongs to the library"), "{reason}");
+    client.close();
+}
+
+#[test]
 fn nothing_that_is_said_brings_it_down() {
     let (folder, motor, drive) = pair();
     let mut client = Client::silent();

@@ -135,6 +135,21 @@ fn address(path: &str) -> String {
     text
 }
 
+/// An address whose blanks and letters beyond ASCII are written as `%20`.
+pub fn escaped(uri: &str) -> String {
+    let mut text = String::with_capacity(uri.len());
+    for byte in uri.bytes() {
+        match byte {
+            b' ' | b'"' | b'<' | b'>' | b'\\' | b'^' | b'`' | b'{' | b'|' | b'}' => {
+                text.push_str(&format!("%{byte:02X}"));
+            }
+            byte if byte.is_ascii_graphic() => text.push(char::from(byte)),
+            byte => text.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    text
+}
+
 /// A text with its `%20` read.
 fn decoded(text: &str) -> String {
     let digit = |byte: Option<&u8>| byte.and_then(|byte| char::from(*byte).to_digit(16));
@@ -193,6 +208,7 @@ mod tests {
         for name in ["/home/u/a b/Φ.bg", "c:/m/y.bg", "std/electrical.bg"] {
             assert_eq!(documents.name(documents.uri(name).unwrap().as_str()), name);
         }
+        assert_eq!(escaped("file:///a b/Φ%20.bg"), "file:///a%20b/%CE%A6%20.bg");
         // The editor's own writing of an address is kept.
         documents.open("file:///c%3A/m/y.bg", String::new(), 1);
         assert_eq!(documents.uri("c:/m/y.bg").unwrap().as_str(), "file:///c%3A/m/y.bg");

@@ -21,6 +21,7 @@ mod completion;
 mod rename;
 mod symbols;
 mod actions;
+mod tokens;
 mod server;
 
 pub use analysis::Checked;

@@ -1,10 +1,10 @@
 //! The server: messages in, answers out, and diagnostics when the editor rests.
 
 use super::analysis::{Analysis, Checked};
-use super::documents::Documents;
+use super::documents::{self, Documents};
 use super::index::Role;
 use super::transport::{self, Incoming};
-use super::{actions, completion, diagnostics, hover, position, rename, symbols};
+use super::{actions, completion, diagnostics, hover, position, rename, symbols, tokens};
 use crate::source::{FileId, SourceMap, loader};
 use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types as lsp;
@@ -222,11 +222,20 @@ impl Server<'_> {
                 let (analysis, file) = self.read(&params.text_document.uri)?;
                 json(symbols::outline(&analysis, file))
             }
+            "textDocument/formatting" => {
+                let params: lsp::DocumentFormattingParams = parsed(params)?;
+                self.formatting(&params.text_document.uri)
+            }
             "textDocument/codeAction" => {
                 let params: lsp::CodeActionParams = parsed(params)?;
                 let (analysis, _) = self.read(&params.text_document.uri)?;
                 let checked = analysis.checked(self.host);
                 json(actions::actions(&analysis, checked, &self.documents, params.range))
+            }
+            "textDocument/semanticTokens/full" => {
+                let params: lsp::SemanticTokensParams = parsed(params)?;
+                let (analysis, file) = self.read(&params.text_document.uri)?;
+                json(lsp::SemanticTokens { result_id: None, data: tokens::tokens(&analysis, file) })
             }
             _ => Err((ErrorCode::MethodNotFound, format!("`{method}` is not known here"))),
         }
@@ -464,6 +473,18 @@ impl Server<'_> {
         json(completion::complete(&analysis, file, byte))
     }
 
+    fn formatting(&mut self, uri: &lsp::Uri) -> Answer {
+        let (analysis, file) = self.read(uri)?;
+        let text = analysis.text(file);
+        let edits = match tokens::formatted(&analysis, file) {
+            Some(new) if new != text => {
+                vec![lsp::TextEdit { range: position::range(text, 0..text.len()), new_text: new }]
+            }
+            _ => vec![],
+        };
+        json(edits)
+    }
+
     /// Checks what has changed and tells the editor what is different from before.
     fn publish(&mut self, output: &mut impl Write) -> io::Result<()> {
         for name in std::mem::take(&mut self.waiting) {
@@ -527,8 +548,27 @@ fn is_graph(name: &str) -> bool {
     name.ends_with(".bg") || name.starts_with("untitled:")
 }
 
-fn parsed<T: DeserializeOwned>(params: Value) -> Result<T, (ErrorCode, String)> {
+fn parsed<T: DeserializeOwned>(mut params: Value) -> Result<T, (ErrorCode, String)> {
+    tidy(&mut params);
     serde_json::from_value(params).map_err(|error| (ErrorCode::InvalidParams, error.to_string()))
+}
+
+/// Addresses as they should have been written: some editors leave blanks and letters such as Φ as they are.
+fn tidy(value: &mut Value) {
+    match value {
+        Value::Object(fields) => {
+            for (key, value) in fields {
+                match value {
+                    Value::String(text) if key == "uri" || key == "rootUri" => {
+                        *text = documents::escaped(text);
+                    }
+                    value => tidy(value),
+                }
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(tidy),
+        _ => {}
+    }
 }
 
 fn json(value: impl serde::Serialize) -> Answer {
@@ -551,6 +591,7 @@ fn capabilities() -> lsp::ServerCapabilities {
         references_provider: Some(lsp::OneOf::Left(true)),
         document_highlight_provider: Some(lsp::OneOf::Left(true)),
         document_symbol_provider: Some(lsp::OneOf::Left(true)),
+        document_formatting_provider: Some(lsp::OneOf::Left(true)),
         code_action_provider: Some(lsp::CodeActionProviderCapability::Options(
             lsp::CodeActionOptions {
                 code_action_kinds: Some(vec![lsp::CodeActionKind::QUICKFIX]),
@@ -565,6 +606,14 @@ fn capabilities() -> lsp::ServerCapabilities {
             trigger_characters: Some([":", ".", "(", ">", " ", "\"", "/"].map(String::from).into()),
             ..lsp::CompletionOptions::default()
         }),
+        semantic_tokens_provider: Some(
+            lsp::SemanticTokensOptions {
+                legend: tokens::legend(),
+                full: Some(lsp::SemanticTokensFullOptions::Bool(true)),
+                ..lsp::SemanticTokensOptions::default()
+            }
+            .into(),
+        ),
         ..lsp::ServerCapabilities::default()
     }
 }
