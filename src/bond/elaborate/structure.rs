@@ -571,7 +571,11 @@ impl<'a> Scope<'a> {
             };
             d.push(error.help(format!("join it with an arrow, as in `{name} -> …`")));
         }
-        if !shape.is_junction() && bonds.len() > 1 {
+        // Bonds of two elements that were given one name are not counted as those of one.
+        let doubled = |said: &Diagnostic| {
+            said.code == "E0203" && said.labels.iter().any(|label| label.span == declaration.span)
+        };
+        if !shape.is_junction() && bonds.len() > 1 && !d.iter().any(doubled) {
             let mut error = Diagnostic::error(
                 "E0402",
                 joined[1].2.span,

@@ -141,6 +141,7 @@ fn help(error: Diagnostic, masked: &str, at: usize, rule: Rule, piece: &Piece) -
             let mut error = error;
             error.message = format!("`{first} = …` declares nothing");
             return error
+                .says("a declaration begins with its word: `param`, `signal`, `drive`")
                 .help(format!("a parameter is declared by `param {first} = …`"))
                 .fix("declare a parameter", vec![(start, "param ".to_string())]);
         }
