@@ -53,11 +53,11 @@ pub fn prepare(
         d.push(
             Diagnostic::warning("W0510", span, format!("nothing determines {}", loose.join(", ")))
                 .because(format!(
-                    "the equations of {} say something twice",
+                    "the equations of {} repeat each other",
                     elements(graph, &equations, &rows)
                 ))
-                .because("they are taken as if 0 flowed, or stood, in the ring")
-                .help("break the ring, or put an R into it"),
+                .because("they are taken as 0")
+                .help("put an R between those that repeat each other, or take one of them away"),
         );
     }
     let compiled = if pins.is_empty() { free } else { compile(&equations, &pins) };

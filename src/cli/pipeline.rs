@@ -12,7 +12,7 @@ use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::netlist::header::Header;
 use crate::netlist::{Netlist, flatten, read, write};
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
 use crate::trace::{Sink, Trace};
@@ -95,12 +95,7 @@ fn check_options(syntax: &syntax::File, overrides: &Overrides, d: &mut Vec<Diagn
         let known = sim::OPTIONS.iter().map(|row| row.name);
         match nearest(key, known).filter(|_| unknown) {
             Some(meant) => {
-                let found = found.help(format!("did you mean `{meant}`?"));
-                let edit = vec![(span, meant.to_string())];
-                d.push(match span.is_none() {
-                    true => found,
-                    false => found.fix(format!("write `{meant}`"), edit),
-                });
+                d.push(did_you_mean(found, span, key, meant));
             }
             None => d.push(found),
         }

@@ -10,7 +10,7 @@ mod relations;
 
 pub use dimension::Dimension;
 pub use domain::{DOMAINS, Domain, DomainRow};
-pub use nearest::{is_slip, nearest};
+pub use nearest::{did_you_mean, is_slip, nearest};
 pub use relations::{Disagreement, Formula, Relations};
 pub use symbols::{PREFIXES, SYMBOLS, Symbol, is_unit_name};
 pub use unit::{Unit, UnitError, scan_unit};

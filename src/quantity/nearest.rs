@@ -1,5 +1,17 @@
 //! The nearest name: what somebody probably meant.
 
+use crate::diagnostic::Diagnostic;
+use crate::source::Span;
+
+/// Adds the nearest name as a hint; and as a fix, where what is written at `span` is surely a slip for it.
+pub fn did_you_mean(error: Diagnostic, span: Span, written: &str, meant: &str) -> Diagnostic {
+    let error = error.help(format!("did you mean `{meant}`?"));
+    if span.is_none() || !is_slip(written, meant) {
+        return error;
+    }
+    error.fix(format!("write `{meant}`"), vec![(span, meant.to_string())])
+}
+
 /// The candidate nearest to `name` by edit distance, when it is near enough to be a likely slip; letters that differ
 /// only in case, and two neighbours swapped, count less. The first of several equally near ones.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

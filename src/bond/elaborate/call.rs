@@ -3,13 +3,13 @@
 
 use super::functions::{self, CALLS, Make, Signature};
 use super::reading::READINGS;
-use super::scope::{Scope, did_you_mean};
+use super::scope::Scope;
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Argument, Call, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, FUNCTIONS, Node};
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::Span;
 
 /// What the language will have.
@@ -89,7 +89,13 @@ impl Scope<'_> {
         }
         let error = Diagnostic::error("E0210", span, format!("unknown function `{name}`"));
         if self.value(name).is_some() {
-            return error.says("a parameter or signal").help("write a product with `*`");
+            return Diagnostic::error(
+                "E0210",
+                span,
+                format!("`{name}` is a value, not a function"),
+            )
+            .says("a parameter or signal")
+            .help(format!("write a product with `*`: `{name}*(…)`"));
         }
         if name == "file" {
             return error
@@ -100,7 +106,7 @@ impl Scope<'_> {
         let known = FUNCTIONS.iter().map(|row| row.name).chain(own).chain(READINGS);
         match nearest(name, known) {
             Some(meant) => {
-                let error = did_you_mean(error.says("not a function"), span, meant);
+                let error = did_you_mean(error.says("not a function"), span, name, meant);
                 match functions::find(meant) {
                     Some(row) => error.because(format!("its form is `{}`", row.form())),
                     None => error,
@@ -148,7 +154,7 @@ impl Scope<'_> {
                         let error =
                             wrong(*span, format!("`{}` has no argument `{name}`", row.name));
                         match nearest(name, row.arguments.iter().map(|(name, _)| *name)) {
-                            Some(meant) => did_you_mean(error, label.name.span, meant),
+                            Some(meant) => did_you_mean(error, label.name.span, name, meant),
                             None => error,
                         }
                     }

@@ -6,7 +6,7 @@
 
 use super::frames::*;
 use super::program::Program;
-use super::scope::{Declaration, Mark, RESERVED, Scope, Setting, Valued, did_you_mean};
+use super::scope::{Declaration, Mark, RESERVED, Scope, Setting, Valued};
 use crate::bond::elements::{ELEMENTS, element};
 use crate::bond::graph::*;
 use crate::bond::syntax::{
@@ -14,7 +14,7 @@ use crate::bond::syntax::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::Expr as Tree;
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::{SourceMap, Span};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -302,7 +302,7 @@ impl<'a> Scope<'a> {
         }));
         names.sort_unstable();
         match nearest(name, names.iter().copied()) {
-            Some(meant) => did_you_mean(error, span, meant),
+            Some(meant) => did_you_mean(error, span, name, meant),
             None if names.is_empty() => error.because("it has none"),
             None => error.because(format!("it has {}", list(&names))),
         }
@@ -590,16 +590,23 @@ impl<'a> Scope<'a> {
             }
             Thing::Port(port) => (self.ports[port.0 as usize].span, false),
         };
-        let error = Diagnostic::error("E0203", end.span, format!("`{key}` is declared twice"))
+        let again = same && end.arguments.is_none();
+        let message = match again {
+            true => format!("`{key}` is declared twice"),
+            false => format!("two elements are called `{key}`"),
+        };
+        let error = Diagnostic::error("E0203", end.span, message)
             .says("declared again here")
             .label(span, "first declared here");
-        d.push(if same && end.arguments.is_none() {
+        d.push(if again {
             error.help("write the name alone to speak of the same element").fix(
                 "leave out the kind",
                 vec![(end.span, self.map.text(end.path.span).to_string())],
             )
         } else {
-            error.help("exactly one occurrence of a name carries its kind")
+            error.help(
+                "give one of them another name; where one was meant, its kind and value stand once",
+            )
         });
         false
     }
@@ -763,7 +770,7 @@ impl<'a> Scope<'a> {
         models.sort_unstable();
         let kinds = ELEMENTS.iter().map(|row| row.kind);
         match nearest(text, kinds.clone().chain(models.iter().copied())) {
-            Some(meant) => did_you_mean(error, kind.span, meant),
+            Some(meant) => did_you_mean(error, kind.span, text, meant),
             None => {
                 let error =
                     error.because(format!("the kinds are {}", kinds.collect::<Vec<_>>().join(" ")));

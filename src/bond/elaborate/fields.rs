@@ -6,7 +6,7 @@
 //! whose laws give e and e of the others. Initial values of a matrix are lists, `q0` or `e0`, `p0` or `f0`; those of
 //! numbered laws are numbered, `q1_0` or `e1_0`. Ports are `coils.1`, `coils.2`; all count into the field.
 
-use super::scope::{Declaration, Scope, a, did_you_mean};
+use super::scope::{Declaration, Scope, a};
 use super::value::{Own, Place};
 use crate::bond::elements::Shape;
 use crate::bond::fields::{MOST_PORTS, combination};
@@ -14,7 +14,7 @@ use crate::bond::graph::*;
 use crate::bond::syntax::{self, Argument, Label, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Expr as Tree;
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::Span;
 
 /// `e2` as (`e`, 2): a variable of a port. Bare letters and `e0` are none.
@@ -467,7 +467,7 @@ fn initial_value<'a>(
         )
         .says("not one of its arguments");
         d.push(match nearest(text, known.iter().map(String::as_str)) {
-            Some(meant) if !label.derivative => did_you_mean(error, label.span, meant),
+            Some(meant) if !label.derivative => did_you_mean(error, label.span, text, meant),
             _ => error.help(usage(shape)),
         });
         return;

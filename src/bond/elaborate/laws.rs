@@ -1,14 +1,14 @@
 //! The law of each element, from its arguments.
 
 use super::fields;
-use super::scope::{Declaration, Meaning, Scope, a, did_you_mean};
+use super::scope::{Declaration, Meaning, Scope, a};
 use super::value::{Own, Place, varies};
 use crate::bond::elements::Shape;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Argument, Label, Value};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Expr as Tree, Node};
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 
 const EFFORT: Own<'static> = ("e", Leaf::Own(Variable::Power(Power::Effort)));
 const FLOW: Own<'static> = ("f", Leaf::Own(Variable::Power(Power::Flow)));
@@ -325,7 +325,7 @@ impl Scope<'_> {
             .map(|form| form.label)
             .chain(INITIALS.iter().filter(|row| row.1 == shape).map(|row| row.0));
         match nearest(name, labels) {
-            Some(meant) if name.len() > 1 => did_you_mean(error, label.span, meant),
+            Some(meant) if name.len() > 1 => did_you_mean(error, label.span, name, meant),
             _ => error,
         }
     }

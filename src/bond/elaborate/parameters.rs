@@ -1,13 +1,13 @@
 //! Parameters: values as they are needed, and what the command line sets.
 
 use super::dimensions::Dim;
-use super::scope::{Mark, Scope, a, did_you_mean};
+use super::scope::{Mark, Scope, a};
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax;
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
-use crate::quantity::{Unit, nearest};
+use crate::quantity::{Unit, did_you_mean, nearest};
 use crate::source::Span;
 
 /// Bounds and indices whose parameters have bounds and indices of their own, and so on.
@@ -48,7 +48,7 @@ impl Scope<'_> {
                     error.help("signals and inputs are not set; `--drive` drives an input")
                 }
                 _ if self.element_named(name).is_some() => self.value_of_element(name, error),
-                (_, _, Some(meant)) => did_you_mean(error, Span::NONE, meant),
+                (_, _, Some(meant)) => did_you_mean(error, Span::NONE, name, meant),
                 _ => error,
             });
         }

@@ -243,18 +243,18 @@ impl Scope<'_> {
         match (found.as_slice(), &call.index) {
             ([bond], None) => Some(variable(what, *bond, false, span)),
             ([], _) => {
-                let error = missing(format!("there is no bond `{written}`")).says("no such bond");
+                let error = |message: String| missing(message).says("no such bond");
                 let reversed = !joins(b.thing, to_port, a.thing, from_port).is_empty();
                 d.push(if reversed {
                     let turned =
                         format!("{} -> {}", self.map.text(to.span), self.map.text(from.span));
-                    error
+                    error(format!("there is no bond `{written}`, only `{turned}`"))
                         .help(format!(
                             "its half arrow points the other way: write `{what}({turned})`"
                         ))
                         .fix("turn it round", vec![(from.span.join(to.span), turned)])
                 } else {
-                    error
+                    error(format!("there is no bond `{written}`"))
                 });
                 None
             }

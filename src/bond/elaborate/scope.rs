@@ -9,7 +9,7 @@ use crate::bond::syntax::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::Table;
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::{FileId, SourceMap, Span};
 use std::cell::OnceCell;
 use std::collections::HashMap;
@@ -170,7 +170,7 @@ impl<'a> Scope<'a> {
             };
         }
         if let Some(meant) = nearest(key, known.iter().copied()) {
-            did_you_mean(error, part.span, meant)
+            did_you_mean(error, part.span, key, meant)
         } else if names.values.contains_key(key) {
             error.because(format!("`{key}` is a parameter or signal, which no bond can join"))
         } else if inside.is_empty() {
@@ -187,13 +187,4 @@ pub(super) const RESERVED: [&str; 6] = ["e", "f", "q", "p", "time", "pi"];
 /// A noun with its article: `an inertia`.
 pub(super) fn a(noun: &str) -> String {
     format!("{} {noun}", if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
-}
-
-/// Adds the nearest name as a hint and a fix.
-pub(super) fn did_you_mean(error: Diagnostic, span: Span, meant: &str) -> Diagnostic {
-    let error = error.help(format!("did you mean `{meant}`?"));
-    if span.is_none() {
-        return error;
-    }
-    error.fix(format!("write `{meant}`"), vec![(span, meant.to_string())])
 }

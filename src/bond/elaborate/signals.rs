@@ -3,13 +3,13 @@
 use super::frames::Here;
 use super::functions::{self, Signature};
 use super::inference::Source;
-use super::scope::{Meaning, Scope, Valued, did_you_mean};
+use super::scope::{Meaning, Scope, Valued};
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Part, parse_drive};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node};
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::Span;
 
 impl Scope<'_> {
@@ -171,7 +171,7 @@ impl Scope<'_> {
                     Diagnostic::error("E0219", name.span, format!("no input is called `{text}`"))
                         .says("not declared anywhere");
                 d.push(match nearest(text, inputs().map(|signal| signal.name.as_str())) {
-                    Some(meant) => did_you_mean(error, name.span, meant),
+                    Some(meant) => did_you_mean(error, name.span, text, meant),
                     None => error.help(format!("declare it: `input {text}`")),
                 });
             }
@@ -206,7 +206,7 @@ impl Scope<'_> {
                         .says("not declared anywhere");
                 let names = self.graph.signals.iter().map(|s| s.name.as_str());
                 d.push(match nearest(text, names) {
-                    Some(meant) => did_you_mean(error, name.span, meant),
+                    Some(meant) => did_you_mean(error, name.span, text, meant),
                     None => error.help(format!("declare it: `signal {text} = …`")),
                 });
             }

@@ -3,11 +3,11 @@
 use super::expand::list;
 use super::fields;
 use super::frames::{Found, FrameId, Here, PortId, Thing};
-use super::scope::{Scope, a, did_you_mean};
+use super::scope::{Scope, a};
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Arrow, Chain, ChainEnd, Part};
 use crate::diagnostic::Diagnostic;
-use crate::quantity::{DOMAINS, Domain, nearest};
+use crate::quantity::{DOMAINS, Domain, did_you_mean, nearest};
 use crate::source::Span;
 use std::collections::{HashMap, HashSet};
 
@@ -98,7 +98,7 @@ impl<'a> Scope<'a> {
                     .says("unknown domain");
                     let names = DOMAINS.iter().map(|row| row.name);
                     d.push(match nearest(&name.text, names.clone()) {
-                        Some(meant) => did_you_mean(error, name.span, meant),
+                        Some(meant) => did_you_mean(error, name.span, &name.text, meant),
                         None => error.because(format!(
                             "the domains are {}",
                             list(&names.collect::<Vec<_>>())
@@ -571,7 +571,11 @@ impl<'a> Scope<'a> {
             };
             d.push(error.help(format!("join it with an arrow, as in `{name} -> …`")));
         }
-        if !shape.is_junction() && bonds.len() > 1 {
+        // Bonds of two elements that were given one name are not counted as those of one.
+        let doubled = |said: &Diagnostic| {
+            said.code == "E0203" && said.labels.iter().any(|label| label.span == declaration.span)
+        };
+        if !shape.is_junction() && bonds.len() > 1 && !d.iter().any(doubled) {
             let mut error = Diagnostic::error(
                 "E0402",
                 joined[1].2.span,

@@ -2,12 +2,12 @@
 
 use super::fields::numbered;
 use super::frames::{FrameId, Round, Thing};
-use super::scope::{Meaning, RESERVED, Scope, a, did_you_mean};
+use super::scope::{Meaning, RESERVED, Scope, a};
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Part, Path};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node, Unary};
-use crate::quantity::nearest;
+use crate::quantity::{did_you_mean, nearest};
 use crate::source::Span;
 
 /// An own variable of an element: the name that a law calls it by, and what it is.
@@ -131,14 +131,12 @@ impl Scope<'_> {
                 return leaf(Leaf::Time);
             }
             "e" | "f" | "q" | "p" => {
-                let error = Diagnostic::error(
-                    "E0217",
-                    span,
-                    format!("`{name}` alone is an element's own variable"),
-                );
+                let error = |message: String| Diagnostic::error("E0217", span, message);
                 d.push(match place.own {
-                    [] => error.says("no element's law stands here").help(place.own_help),
-                    own => error
+                    [] => error(format!("`{name}` alone is an element's own variable"))
+                        .says("no element's law stands here")
+                        .help(place.own_help),
+                    own => error(format!("`{name}` is no variable of this law"))
                         .says(format!(
                             "this law is one over {}",
                             own.iter()
@@ -326,9 +324,18 @@ impl Scope<'_> {
             Some(Thing::Vertex(id)) => {
                 let vertex = self.declarations[id.index()];
                 let name = self.shown(*id);
-                return error
-                    .label(vertex.span, format!("`{name}` is {}", a(vertex.element.noun)))
-                    .help(format!("to read its variables write `e({name})`, `f({name})`"));
+                let noun = a(vertex.element.noun);
+                let read = match vertex.element.kind {
+                    "0" => format!("`e({name})`"),
+                    "1" => format!("`f({name})`"),
+                    "TF" | "MTF" | "GY" | "MGY" => format!("`e({name}.1)`, `f({name}.2)`"),
+                    _ => format!("`e({name})`, `f({name})`"),
+                };
+                let message = format!("`{name}` is {noun}, no value");
+                return Diagnostic::error("E0208", span, message)
+                    .says("a value is needed here")
+                    .label(vertex.span, format!("`{name}` is declared here"))
+                    .help(format!("to read its variables write {read}"));
             }
             Some(Thing::Instance(inner)) => {
                 let inner = &self.frames[inner.0 as usize];
@@ -366,7 +373,7 @@ impl Scope<'_> {
             };
         }
         match nearest(name, known) {
-            Some(meant) => did_you_mean(error, span, meant),
+            Some(meant) => did_you_mean(error, span, name, meant),
             None if RESERVED.contains(&name) || inside => error,
             None => error.help(format!("declare it: `param {name} = …`")),
         }

@@ -138,7 +138,10 @@ fn help(error: Diagnostic, masked: &str, at: usize, rule: Rule, piece: &Piece) -
         let first = &masked[..first_length];
         if word == "=" && before == first {
             let start = Span { end: piece.span.start, ..piece.span };
+            let mut error = error;
+            error.message = format!("`{first} = …` declares nothing");
             return error
+                .says("a declaration begins with its word: `param`, `signal`, `drive`")
                 .help(format!("a parameter is declared by `param {first} = …`"))
                 .fix("declare a parameter", vec![(start, "param ".to_string())]);
         }
@@ -152,6 +155,14 @@ fn help(error: Diagnostic, masked: &str, at: usize, rule: Rule, piece: &Piece) -
         }
         if before == first && elements::element(first).is_some() {
             return error.help(format!("an element is written with a colon, `{first}:{word}`"));
+        }
+        if rest.starts_with(|c: char| c.is_alphanumeric())
+            && before.ends_with(|c: char| c.is_alphanumeric() || c == ')')
+            && rest.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').starts_with(':')
+        {
+            let mut error = error;
+            error.message = "an arrow is missing between two elements".to_string();
+            return error.help("write `->` between them, or a comma in a list of ends");
         }
         if word == ">" || (word == "-" && rest.trim_start_matches(['-', ' ']).starts_with('>')) {
             return error.help("a half arrow is written `->`");

@@ -5,7 +5,7 @@ use super::tree::{Argument, Call, Expr, Label, Leaf, Name, Part, Path, Sum, Valu
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{Dialect, Node};
-use crate::quantity::{Unit, UnitError};
+use crate::quantity::{Unit, UnitError, is_slip};
 use crate::source::{FileId, Span};
 use pest::iterators::Pair;
 
@@ -115,8 +115,8 @@ impl Reader<'_> {
             true => format!("{literal}*1{power}"),
             false => format!("{literal}{power}"),
         };
-        Diagnostic::error("E0301", place, format!("`{prefix}` is not a unit that I know"))
-            .says("a prefix without a unit")
+        Diagnostic::error("E0301", place, format!("`{prefix}` is a prefix without a unit"))
+            .says("no unit follows it")
             .help(format!("prefixes stand on units, never on bare numbers: write `{meant}`"))
     }
 
@@ -244,7 +244,7 @@ pub fn unit(text: &str, span: Span, d: &mut Vec<Diagnostic>) -> Option<Unit> {
                     let help =
                         error.says("unknown unit").help(format!("did you mean `{nearest}`?"));
                     let whole = format!("{}{nearest}{}", &text[..at.start], &text[at.end..]);
-                    if Unit::parse(&whole).is_ok() {
+                    if Unit::parse(&whole).is_ok() && is_slip(&name, &nearest) {
                         help.fix(format!("write `{nearest}`"), vec![(part(&at), nearest)])
                     } else {
                         help

@@ -15,6 +15,9 @@ use crate::source::{FileId, SourceMap, Span};
 /// Errors of syntax after which reading a file stops telling more: it is probably no bond graph at all.
 const MOST_ERRORS: usize = 30;
 
+/// As many are enough when nothing at all could be read.
+const FIRST_ERRORS: usize = 5;
+
 /// Blocks within one another, at most; each `else if` counts as one.
 pub const MOST_BLOCKS: usize = 64;
 
@@ -33,11 +36,18 @@ pub fn parse(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> File {
         };
         errors += d[seen..].iter().filter(|d| d.severity == Severity::Error).count();
         seen = d.len();
-        if errors >= MOST_ERRORS {
-            d.push(
-                Diagnostic::note("N0101", Span::NONE, "the rest of the file is not looked at")
-                    .because(format!("{MOST_ERRORS} errors of syntax were enough")),
-            );
+        let read = |s: &Statement| !matches!(s.kind, StatementKind::Unreadable);
+        let none =
+            errors >= FIRST_ERRORS && blocks.open.is_empty() && !blocks.statements.iter().any(read);
+        if errors >= MOST_ERRORS || none {
+            let note =
+                Diagnostic::note("N0101", Span::NONE, "the rest of the file is not looked at");
+            d.push(match none {
+                true => note
+                    .because("not one statement could be read: this looks like no bond graph")
+                    .help("a bond graph begins as `Se:U(10 V) -> 1:mesh`; the names of netlists do not end in .bg"),
+                false => note.because(format!("{MOST_ERRORS} errors of syntax were enough")),
+            });
             blocks.open.clear();
             break;
         }
