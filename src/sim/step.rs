@@ -66,15 +66,19 @@ pub fn transient(
         let coarse = Settings { reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
         let mut run = Run::new(system, &coarse, None, None);
         match run.run() {
-            Ok(()) => pilot = Some((run.largest, run.network.statistics)),
+            Ok(()) => {
+                pilot = Some((run.largest, run.network.statistics, run.network.tracks));
+            }
             Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
             // The real run will say what is wrong, if anything is.
             Err(_) => {}
         }
     }
-    let magnitudes = pilot.as_ref().map(|(largest, _)| largest.as_slice());
+    let magnitudes = pilot.as_ref().map(|(largest, ..)| largest.as_slice());
     let mut run = Run::new(system, settings, magnitudes, Some(sink));
-    if let Some((_, statistics)) = &pilot {
+    if let Some((_, statistics, tracks)) = &pilot {
+        let known = run.network.tracks.iter_mut().zip(tracks);
+        known.for_each(|(track, known)| track.learn(known));
         run.network.statistics.add_work(statistics);
         run.network.statistics.pilot = statistics.accepted;
     }

@@ -18,6 +18,7 @@ use super::graph::{
     Storage, StoreLaw, Variable, VertexId,
 };
 use crate::expr::{self, Binary, Function, Node};
+use crate::source::Span;
 pub use compiled::Compiled;
 pub use known::Known;
 use known::{held_corners, over_time_alone, resolve};
@@ -56,10 +57,36 @@ pub enum Input {
     Time,
     /// A function of time with corners, by its index in [`Equations::waves`].
     Wave(u32),
+    /// The value of a condition that follows from the unknowns, by its index in [`Equations::conditions`].
+    Condition(u32),
 }
 
 /// An equation's right-hand side or residual.
 pub type Formula = expr::Expr<Input>;
+
+/// An operation whose value jumps where a − b changes its sign, or `floor(a)` its value.
+#[derive(Clone, Debug)]
+pub struct Condition {
+    /// What it asks.
+    pub question: Question,
+    /// The values that it compares; b is 0 where there is one only.
+    pub a: Formula,
+    /// The other one.
+    pub b: Formula,
+    /// The element or signal in whose law it stands.
+    pub span: Span,
+}
+
+/// What a condition asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// `a < b` and the like: 1 or 0.
+    Compare(Binary),
+    /// The sign of a.
+    Sign,
+    /// The largest whole number that is not above a.
+    Floor,
+}
 
 /// The equations of a graph.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +105,8 @@ pub struct Equations {
     pub origins: Vec<Origin>,
     /// Functions of time.
     pub waves: Vec<Known>,
+    /// What jumps with the unknowns.
+    pub conditions: Vec<Condition>,
     /// First index of the bonds' efforts; flows alternate with them.
     first_bond: usize,
     /// By signal: its unknown or its wave.
@@ -352,6 +381,20 @@ impl Equations {
             return held;
         }
         let node = match &*expr.node {
+            Node::Binary(op, a, b) if op.is_comparison() => {
+                let (a, b) = (self.lower(graph, a, own), self.lower(graph, b, own));
+                return self.condition(Question::Compare(*op), a, b, expr.span);
+            }
+            Node::Call(function @ (Function::Floor | Function::Sign), arguments)
+                if arguments.len() == 1 =>
+            {
+                let a = self.lower(graph, &arguments[0], own);
+                let question = match function {
+                    Function::Sign => Question::Sign,
+                    _ => Question::Floor,
+                };
+                return self.condition(question, a, Formula::number(0.0), expr.span);
+            }
             Node::Leaf(leaf) => return self.lower_leaf(graph, leaf, own),
             Node::Number(value) => Node::Number(*value),
             Node::Unary(op, a) => Node::Unary(*op, self.lower(graph, a, own)),
@@ -359,9 +402,7 @@ impl Equations {
                 Node::Binary(*op, self.lower(graph, a, own), self.lower(graph, b, own))
             }
             // x − y·floor(x/y), so that its jumps are found as those of the floor.
-            Node::Call(Function::Mod, arguments)
-                if over_time_alone(expr) && arguments.len() == 2 =>
-            {
+            Node::Call(Function::Mod, arguments) if arguments.len() == 2 => {
                 let (x, y) = (&arguments[0], &arguments[1]);
                 let quotient = x.clone().binary(Binary::Divide, y.clone());
                 let turns =
@@ -421,6 +462,15 @@ impl Equations {
         Some(Formula::leaf(Input::Wave(self.waves.len() as u32 - 1)))
     }
 
+    /// The value of a condition; that of numbers is a number.
+    fn condition(&mut self, question: Question, a: Formula, b: Formula, span: Span) -> Formula {
+        if let (Some(a), Some(b)) = (a.constant(), b.constant()) {
+            return Formula::number(question.value(a, b));
+        }
+        self.conditions.push(Condition { question, a, b, span });
+        Formula::leaf(Input::Condition(self.conditions.len() as u32 - 1))
+    }
+
     /// Sorted times of 0, every corner and `until`.
     pub fn corners(&self, until: f64) -> Vec<f64> {
         let mut corners = vec![];
@@ -431,6 +481,17 @@ impl Equations {
             }
         }
         waveform::merge_corners(corners, until)
+    }
+}
+
+impl Question {
+    /// What it has for an answer at (a, b).
+    pub fn value(self, a: f64, b: f64) -> f64 {
+        match self {
+            Question::Compare(op) => op.value(a, b),
+            Question::Sign => crate::expr::values::sign(a),
+            Question::Floor => a.floor(),
+        }
     }
 }
 
