@@ -171,6 +171,11 @@ impl Conditions {
         all
     }
 
+    /// The side that a condition is on: −1, 0, 1.
+    pub fn mode(&self, condition: usize) -> f64 {
+        self.states.get(condition).map_or(0.0, |state| state.mode)
+    }
+
     /// Knows the ranges that guards have run through in another run.
     pub fn learn(&mut self, other: &Conditions) {
         for (state, known) in self.states.iter_mut().zip(&other.states) {

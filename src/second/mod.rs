@@ -6,6 +6,7 @@
 
 pub mod energy;
 pub mod events;
+mod memories;
 pub mod radau;
 
 use crate::bond::causality::Causality;
@@ -19,6 +20,7 @@ use crate::diagnostic::Diagnostic;
 use crate::expr::{Node, Unary};
 use energy::{Energy, Meter};
 use events::Conditions;
+use memories::Memories;
 use radau::{B, Radau, Statistics, Step, Stop, Verdict};
 
 /// How to run.
@@ -203,14 +205,26 @@ fn march(
     if let Some(known) = known {
         conditions.learn(known);
     }
-    for pair in corners.windows(2) {
-        let (from, to) = (pair[0], pair[1]);
+    let memories = Memories::new(&prepared.equations, start, until);
+    let mut corners = corners.to_vec();
+    let mut next = 0;
+    while let Some(&[from, to]) = corners.get(next..next + 2) {
+        next += 1;
         let inside = 0.5 * (from + to);
-        let Prepared { compiled, structure, .. } = &mut *prepared;
+        let Prepared { compiled, structure, equations } = &mut *prepared;
         if from > 0.0 || !conditions.is_empty() {
-            conditions
-                .settle(compiled, structure, from, [from, to], &mut y)
-                .map_err(|trouble| Failure::Restart { t: from, trouble })?;
+            let mut settle = |y: &mut [f64]| {
+                conditions.settle(compiled, structure, from, [from, to], y)?;
+                while memories.flip(&conditions) {
+                    conditions.settle(compiled, structure, from, [from, to], y)?;
+                }
+                Ok(())
+            };
+            let settled = match from > 0.0 {
+                true => equations.take(from, inside, memories.room, &mut y, &mut settle),
+                false => settle(&mut y),
+            };
+            settled.map_err(|trouble| Failure::Restart { t: from, trouble })?;
             sizes.see(&y);
         }
         let mut t = from;
@@ -219,6 +233,7 @@ fn march(
             conditions.see_noise(compiled, t, inside, &y, &weights);
             let mut radau = Radau::new(compiled, weights);
             radau.growing = if pilot { settings.tolerance } else { 0.0 };
+            radau.longest = memories.longest;
             radau.maximum_steps = settings.maximum_steps.saturating_sub(statistics.accepted);
             let first = first_step(&mut radau, [t, from, to], &y, h);
             let mut reached = t;
@@ -228,6 +243,7 @@ fn march(
                 if !matches!(verdict, Verdict::Again(_)) {
                     let ends = verdict == Verdict::End && step.t + step.h < to;
                     sizes.see(step.start);
+                    memories.extend(step, (from, to));
                     report(&Event::Step { step, from, to, ends, compiled });
                     reached = step.t + step.h;
                 }
@@ -250,7 +266,24 @@ fn march(
                 conditions
                     .pass(compiled, structure, t, [from, to], &mut y)
                     .map_err(|trouble| Failure::Restart { t, trouble })?;
+                while memories.flip(&conditions) {
+                    conditions
+                        .settle(compiled, structure, t, [from, to], &mut y)
+                        .map_err(|trouble| Failure::Restart { t, trouble })?;
+                }
                 sizes.see(&y);
+                if memories.any_delay() {
+                    // What jumps here jumps again when a delay is over: the rest is segments of their own.
+                    let echoes = memories.echoes(t, until);
+                    corners.insert(next, t);
+                    for echo in echoes {
+                        let at = corners.partition_point(|corner| *corner < echo - memories.room);
+                        if corners.get(at).is_none_or(|corner| *corner > echo + memories.room) {
+                            corners.insert(at, echo);
+                        }
+                    }
+                    break;
+                }
             }
         }
     }

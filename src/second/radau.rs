@@ -124,7 +124,11 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// The collocation polynomial at `t`.
     pub fn at(&self, t: f64, y: &mut [f64]) {
-        let x = (t - self.t) / self.h;
+        self.part((t - self.t) / self.h, y);
+    }
+
+    /// The collocation polynomial at a part of the step, of as many unknowns as there is room for.
+    pub fn part(&self, x: f64, y: &mut [f64]) {
         let weights: Vec<f64> =
             (0..3).map(|j| x * (P[j][0] + x * (P[j][1] + x * P[j][2]))).collect();
         for (i, value) in y.iter_mut().enumerate() {
@@ -148,6 +152,8 @@ pub struct Radau<'a> {
     pub statistics: Statistics,
     /// Attempts after which a run is given up.
     pub maximum_steps: usize,
+    /// No step is longer: what a delay gives within it must be past.
+    pub longest: f64,
     real: Option<Lu<f64>>,
     complex: Option<Lu<Complex>>,
     real_values: Vec<f64>,
@@ -168,6 +174,7 @@ impl<'a> Radau<'a> {
             growing: 0.0,
             statistics: Statistics::default(),
             maximum_steps: 20_000_000,
+            longest: f64::INFINITY,
             real: None,
             complex: None,
             real_values: vec![0.0; entries],
@@ -207,6 +214,7 @@ impl<'a> Radau<'a> {
                 fresh = false;
             }
             let remaining = to - t;
+            h = h.min(self.longest);
             let ends = asked.is_none() && h >= remaining * (1.0 - 1e-10);
             let step = match asked.take() {
                 Some(asked) => asked,

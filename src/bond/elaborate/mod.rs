@@ -80,9 +80,10 @@ pub fn elaborate(
     scope.join_bonds(d);
     scope.evaluate_parameters(d);
     scope.infer_domains();
+    scope.set_run(overrides, d);
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
-    scope.set_experiment(overrides, d);
+    scope.set_observed(overrides.observe.as_deref(), d);
     if !has_errors(&d[before..]) {
         crate::bond::fields::check(&scope.graph, d);
     }

@@ -1,6 +1,7 @@
 //! Functions of time that are known beforehand: waveforms, and what jumps over time alone.
 
 use super::Formula;
+use super::memory::Memory;
 use super::waveform::Wave;
 use crate::bond::graph::{BondGraph, Expr, Leaf, Waveform};
 use crate::expr::{Function, Node};
@@ -10,6 +11,8 @@ use crate::expr::{Function, Node};
 pub enum Known {
     /// A waveform.
     Wave(Wave),
+    /// What a memory holds.
+    Memory(Memory),
     /// Something over time alone that jumps (a comparison, a floor): held at its value inside the segment.
     Held(Formula),
 }
@@ -19,6 +22,7 @@ impl Known {
     pub fn value(&self, t: f64, inside: f64) -> f64 {
         match self {
             Known::Wave(wave) => wave.value(t, inside),
+            Known::Memory(memory) => memory.value(t, inside),
             Known::Held(formula) => at_time(formula, inside),
         }
     }
@@ -146,6 +150,9 @@ pub(super) fn resolve(graph: &BondGraph, waveform: &Waveform) -> Wave {
             damping: number(damping),
             phase: number(phase),
         },
+        Waveform::Noise { seed, rms, dt } => {
+            Wave::Noise { seed: number(seed) as u64, rms: number(rms), dt: number(dt) }
+        }
         Waveform::Pwl(points) => {
             Wave::Pwl(points.iter().map(|(t, y)| (number(t), number(y))).collect())
         }

@@ -376,6 +376,7 @@ impl Run<'_> {
             self.say_slide(&Slide { mode, width });
         }
         self.restart(Moment::Restart)?;
+        self.settle_memories(Moment::Restart)?;
         self.shorten();
         self.row_here()
     }
