@@ -681,7 +681,7 @@ fn a_text_is_laid_out_as_fmt_does() {
     let file = uri(&folder.path().join("wild.bg"));
     let text = "# 🚀\n  Se:U( 10 V )->1:Φ   # Φ\nΦ->R:R(2   ),C:C( 1 mF)\n";
     client.open(&file, text);
-    let mut format = |client: &mut Client| {
+    let format = |client: &mut Client| {
         let options = json!({ "tabSize": 2, "insertSpaces": true });
         let params = json!({ "textDocument": { "uri": file }, "options": options });
         client.ask("textDocument/formatting", params)

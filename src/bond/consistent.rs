@@ -136,6 +136,23 @@ pub fn newton_from_anywhere(
             Err(trouble) => first = first.or(Some(trouble)),
         }
     }
+    // Where a condition's sides both lead back to it, what holds lies between them.
+    if compiled.ramp_free(1.0) {
+        let mut trial = y.to_vec();
+        let mut last = Ok(());
+        for narrower in 0..10 {
+            compiled.ramp_free(10f64.powi(narrower));
+            last = newton(compiled, slots, t, inside, &mut trial);
+            if last.is_err() {
+                break;
+            }
+        }
+        compiled.ramp_free(0.0);
+        if last.is_ok() {
+            y.copy_from_slice(&trial);
+            return Ok(());
+        }
+    }
     Err(first.unwrap_or(Trouble::Diverged { row: 0 }))
 }
 

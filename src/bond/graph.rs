@@ -138,6 +138,33 @@ pub enum SignalLaw {
     Integrator { rate: Expr, initial: Initial },
     /// A function of time alone with corners that the solver lands on.
     Waveform(Waveform),
+    /// What another value was, as its kind says; constant, or known, between instants.
+    #[allow(missing_docs)]
+    Memory { kind: Memory, input: Expr },
+}
+
+/// How a value is remembered; arguments are expressions of parameters only.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub enum Memory {
+    /// 1 from when the input rises above `high`, 0 from when it falls below `low`; 0 at first in between.
+    Hysteresis { low: Expr, high: Expr },
+    /// The input at 0, `period`, 2·`period` …, held until the next of these instants.
+    Sample { period: Expr },
+    /// The input `by` seconds before; until then its value at the start.
+    Delay { by: Expr },
+}
+
+impl SignalLaw {
+    /// The expression that holds during the run: the value, the rate of an integrator, what is remembered.
+    pub fn expression(&self) -> Option<&Expr> {
+        match self {
+            SignalLaw::Algebraic(expr)
+            | SignalLaw::Integrator { rate: expr, .. }
+            | SignalLaw::Memory { input: expr, .. } => Some(expr),
+            SignalLaw::Waveform(_) => None,
+        }
+    }
 }
 
 /// A value at t = 0.
@@ -168,6 +195,9 @@ pub enum Waveform {
     Sine { offset: Expr, amplitude: Expr, frequency: Expr, delay: Expr, damping: Expr, phase: Expr },
     /// Straight lines between points, holding the end values; two equal times make a jump.
     Pwl(Vec<(Expr, Expr)>),
+    /// Normal random numbers of mean 0, each held for `dt`; see [`super::noise`].
+    #[allow(missing_docs)]
+    Noise { seed: Expr, rms: Expr, dt: Expr },
 }
 
 /// A junction or an element.

@@ -125,9 +125,10 @@ pub fn start(
             Said::AtRest => slots[k] = Slot::OWN,
         }
     }
-    if let Err(trouble) =
-        consistent::newton_from_anywhere(compiled, &slots, 0.0, 0.5 * horizon, &mut y)
-    {
+    let inside = 0.5 * horizon;
+    let mut solve =
+        |y: &mut [f64]| consistent::newton_from_anywhere(compiled, &slots, 0.0, inside, y);
+    if let Err(trouble) = equations.take(0.0, inside, 0.0, &mut y, &mut solve) {
         d.push(explain(graph, equations, compiled, &trouble, "E0504", "at t = 0"));
         return None;
     }

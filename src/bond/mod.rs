@@ -4,6 +4,8 @@ pub mod syntax;
 pub mod elaborate;
 pub mod elements;
 pub mod graph;
+pub mod noise;
+pub mod memory;
 pub mod causality;
 pub mod equations;
 pub mod structure;

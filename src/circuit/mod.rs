@@ -122,6 +122,18 @@ pub enum DeviceKind {
         off_resistance: f64,
         initially_on: Option<bool>,
     },
+    /// Lossless transmission line between two ports.
+    Line {
+        impedance: f64,
+        delay: f64,
+        /// v1, i1, v2, i2 until the first delay is over.
+        initial: Option<[f64; 4]>,
+    },
+    /// The voltage of the second node as it was at the last multiple of the period, at the first node.
+    Hold {
+        period: f64,
+        round: u32,
+    },
     /// Junction diode, level 1.
     Diode {
         model: DiodeModel,

@@ -22,6 +22,7 @@ pub struct Stamper<'a> {
 #[derive(Clone, Copy, Default)]
 struct Slots {
     branch: Option<UnknownId>,
+    second: Option<UnknownId>,
     internal: Option<UnknownId>,
     charge: Option<u32>,
     mode: Option<u32>,
@@ -133,6 +134,18 @@ impl<'a> Stamper<'a> {
                 });
             }
         }
+        for (id, device) in circuit.ids() {
+            if (devices::row(&device.kind).needs)(&device.kind).second {
+                slots[id.0 as usize].second = Some(UnknownId(stamps.unknowns.len() as u32));
+                stamps.unknowns.push(Unknown {
+                    name: format!("i({}#2)", device.name.to_lowercase()),
+                    voltage: false,
+                    nominal: device.nominal,
+                    device: Some(id),
+                    span: device.span,
+                });
+            }
+        }
         Stamper { circuit, stamps, diagnostics, slots }
     }
 
@@ -195,6 +208,17 @@ impl<'a> Stamper<'a> {
     pub fn ends(&self, id: DeviceId) -> [Option<UnknownId>; 2] {
         let nodes = &self.device(id).nodes;
         [0, 1].map(|k| nodes.get(k).and_then(|node| self.node(*node)))
+    }
+
+    /// The unknowns of the nodes of a device's two ports.
+    pub fn four_ends(&self, id: DeviceId) -> [Option<UnknownId>; 4] {
+        let nodes = &self.device(id).nodes;
+        [0, 1, 2, 3].map(|k| nodes.get(k).and_then(|node| self.node(*node)))
+    }
+
+    /// The second branch current of a device that has one.
+    pub fn second(&self, id: DeviceId) -> Option<UnknownId> {
+        self.slots[id.0 as usize].second
     }
 
     /// The branch current of a device that has one.

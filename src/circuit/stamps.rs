@@ -139,6 +139,31 @@ pub struct Mode {
     pub initial: Option<bool>,
 }
 
+/// A term of b that follows from the past of `input`.
+#[derive(Clone, Debug)]
+pub struct MemoryStamp {
+    /// The device.
+    pub device: DeviceId,
+    /// How it follows.
+    pub kind: MemoryKind,
+    /// What is remembered.
+    pub input: Law,
+    /// The right-hand sides that it enters, with factors.
+    pub into: Vec<(UnknownId, f64)>,
+    /// Its value at the start, where the card says so; else 0 with given initial values, or that of the operating point.
+    pub initial: Option<f64>,
+}
+
+/// How a memory follows its input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum MemoryKind {
+    /// The input a time before, in seconds.
+    Delay { by: f64 },
+    /// The input at the last multiple of a period, in seconds; rounds part those that hold at one instant.
+    Hold { period: f64, round: u32 },
+}
+
 /// All that a circuit comes down to.
 #[derive(Clone, Debug, Default)]
 pub struct Stamps {
@@ -154,6 +179,8 @@ pub struct Stamps {
     pub laws: Vec<LawStamp>,
     /// Independent sources.
     pub sources: Vec<SourceStamp>,
+    /// Terms that follow from the past.
+    pub memories: Vec<MemoryStamp>,
     /// Modes.
     pub modes: Vec<Mode>,
     /// Output columns: name and value.

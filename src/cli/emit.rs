@@ -2,8 +2,8 @@
 
 use super::table::Table;
 use crate::bond::graph::{
-    self, BondGraph, Dissipation, Initial, Law, Modulus, Power, SignalLaw, Storage, StoreInitial,
-    StoreLaw, Variable,
+    self, BondGraph, Dissipation, Initial, Law, Memory, Modulus, Power, SignalLaw, Storage,
+    StoreInitial, StoreLaw, Variable,
 };
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{self, Circuit, DeviceKind, Waveform};
@@ -101,7 +101,17 @@ fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
         SignalLaw::Integrator { rate, initial } => {
             format!("integ({}, {})", text(rate), initial_value(graph, initial))
         }
+        SignalLaw::Memory { kind, input } => match kind {
+            Memory::Hysteresis { low, high } => {
+                format!("hysteresis({}, {}, {})", text(input), text(low), text(high))
+            }
+            Memory::Sample { period } => format!("sample({}, {})", text(input), text(period)),
+            Memory::Delay { by } => format!("delay({}, {})", text(input), text(by)),
+        },
         SignalLaw::Waveform(waveform) => match waveform {
+            graph::Waveform::Noise { seed, rms, dt } => {
+                format!("noise({}, {}, {})", text(seed), text(rms), text(dt))
+            }
             graph::Waveform::Step { at, before, after } => list("step", &[at, before, after]),
             graph::Waveform::Ramp { at, slope } => list("ramp", &[at, slope]),
             graph::Waveform::Pulse { low, high, delay, rise, fall, width, period } => {
@@ -226,6 +236,12 @@ pub fn circuit(circuit: &Circuit) -> String {
                 number(*off),
                 number(*off_resistance)
             ),
+            DeviceKind::Line { impedance, delay, .. } => {
+                format!("line of {} Ohm, {} s", number(*impedance), number(*delay))
+            }
+            DeviceKind::Hold { period, round } => {
+                format!("sample every {} s, round {round}", number(*period))
+            }
             DeviceKind::Diode { model, area } => {
                 format!("diode is={} area={}", number(model.saturation_current), number(*area))
             }

@@ -72,7 +72,6 @@ pub const CODES: &[Code] = &[
     row("E0219", "not an input", "`drive` says what an input gets. Signals have laws of their own, parameters have values."),
     row("E0220", "statement said twice", "An input is driven once, and a file has one `simulate`."),
     row("E0221", "two columns of one name", "Each column needs a header of its own; `as \"name\"` gives one."),
-    row("E0222", "function is not part of the language yet", "The function will be; it cannot be used yet."),
     row("E0223", "no such parameter to set", "--set NAME=VALUE sets a parameter of the file."),
     row("E0224", "not a signal", "`output` names signals of the file."),
     row("E0225", "a memory in what is observed", "Looking must not change a model: functions with memory and waveforms need a signal of their own, which can then be observed."),
@@ -145,6 +144,7 @@ pub const CODES: &[Code] = &[
     // -- 06: translation
     row("E0601", "needed flow is undetermined", "A law, a linked source or a column needs the flow of a bond in a ring of equal junctions, and the junctions leave what runs round the ring undetermined. Leave out one bond of the ring."),
     row("E0602", "quantity is in no circuit variable", "The quantity is left undetermined by the junctions, or is no variable of its element, so that no node or current of the circuit holds it. Observe another variable."),
+    row("E0603", "too many random numbers", "In a netlist `noise` is a piecewise linear source with a step for each random number until the end of the run. Hold each number for longer, or end the run earlier."),
     // -- 07: netlists and circuits
     row("E0701", "not a card", "A line of a netlist begins with the letter of a device, a dot, an asterisk or a plus sign; of the cards with a dot, the known ones are named in the manual."),
     row("E0702", "not read yet", "The card or form belongs to SPICE, but this program does not read it yet. It is an error and not a warning, since leaving it out would make another circuit."),
@@ -174,6 +174,7 @@ pub const CODES: &[Code] = &[
     row("E0751", "coupling makes no sense", "K couples two different inductors of the same sign by -1 <= k <= 1; the mutual inductance is k*sqrt(L1*L2)."),
     row("E0752", "switch makes no sense", "A switch needs two resistances other than 0 and a hysteresis that is not negative: it closes above Vt + Vh and opens below Vt - Vh."),
     row("E0753", "diode makes no sense", "Is, N, Vj, BV, IBV and the area of a diode are above 0, M and FC from 0 to below 1."),
+    row("E0754", "line makes no sense", "A lossless line has an impedance and a delay above 0: Z0 and TD, or F and NL with TD = NL/F."),
     row("E0780", "floating node", "Nothing determines the voltage of a node, or of a group of nodes: only current sources, or nothing at all, join it to the rest of the circuit. Join it to ground by a resistor, or name one of the nodes 0."),
     row("E0781", "loop of voltage sources", "Voltage sources form a loop, so that any current could flow round it; two of them in parallel are such a loop. Put a resistance into the loop, or take one source out."),
     row("W0701", "suffix seldom meant so", "SPICE folds case: `1M` is a milli, `1F` a femto, `1A` an atto. Write `meg` for a million, and no letter for a farad or an ampere; a small letter silences the warning."),

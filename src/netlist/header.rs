@@ -10,6 +10,8 @@
 //! | `option` | `reltol=1e-6` | an option of the run; wins over `.options` |
 //! | `jump` | `V_x 0.1 0.3` | the steep segments of the PWL of V_x that start at these times are exact jumps |
 //! | `jump` | `V_x rise fall` | the same of the edges of a PULSE |
+//! | `jump` | `V_x steps` | every second segment of the PWL, from its second on, is one |
+//! | `sample` | `S_x C_x V_x 0.01 0` | S_x is no switch but holds the voltage at its second node, as it is at 0, 0.01 …, at its first one; its capacitor and its clock mean nothing; it comes in round 0 of those that do so at one instant |
 //! | `domain` | `hydraulic 1e6 1e-5 v(a) i(V_b)` | domain, usual magnitudes of its effort and flow in SI, variables |
 //! | `column` | `["pump pressure","bar","v(a)/100000"]` | an output column: header, unit, value, as JSON |
 //!
@@ -31,6 +33,8 @@ pub struct Header {
     pub options: Vec<(String, String)>,
     /// Which steep segments are exact jumps.
     pub jumps: Vec<Jumps>,
+    /// Switches that stand for exact samples.
+    pub samples: Vec<Sample>,
     /// Domains with their variables.
     pub domains: Vec<DomainVariables>,
     /// Output columns in order; empty when nothing was observed.
@@ -48,6 +52,23 @@ pub struct Jumps {
     pub rise: bool,
     /// For a PULSE: whether its fall is one.
     pub fall: bool,
+    /// For a PWL: whether every second segment, from the second on, is one.
+    pub steps: bool,
+}
+
+/// A switch, a capacitor and a clock that stand for a value held between instants.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// The switch, from the node that holds to the one that is sampled.
+    pub switch: String,
+    /// The capacitor at the node that holds.
+    pub capacitor: String,
+    /// The source that closes the switch for a moment.
+    pub clock: String,
+    /// The time between instants, the first of which is 0, in seconds.
+    pub period: f64,
+    /// In which round it takes its value where several do at one instant.
+    pub round: u32,
 }
 
 /// Circuit variables of a domain.
@@ -95,7 +116,12 @@ impl Header {
             words.extend(jumps.times.iter().map(|time| number(*time)));
             words.extend(jumps.rise.then(|| "rise".to_string()));
             words.extend(jumps.fall.then(|| "fall".to_string()));
+            words.extend(jumps.steps.then(|| "steps".to_string()));
             push("jump", words.join(" "));
+        }
+        for sample in &self.samples {
+            let Sample { switch, capacitor, clock, period, round } = sample;
+            push("sample", format!("{switch} {capacitor} {clock} {} {round}", number(*period)));
         }
         for domain in &self.domains {
             let begin =
@@ -145,10 +171,25 @@ impl Header {
                     match word {
                         "rise" => jumps.rise = true,
                         "fall" => jumps.fall = true,
+                        "steps" => jumps.steps = true,
                         time => jumps.times.push(time.parse().ok()?),
                     }
                 }
                 self.jumps.push(jumps);
+            }
+            "sample" => {
+                let mut words = value.split_whitespace();
+                let mut next = || words.next().map(str::to_string);
+                self.samples.push(Sample {
+                    switch: next()?,
+                    capacitor: next()?,
+                    clock: next()?,
+                    period: next()?
+                        .parse()
+                        .ok()
+                        .filter(|period: &f64| *period > 0.0 && period.is_finite())?,
+                    round: next()?.parse().ok()?,
+                });
             }
             "domain" => {
                 let mut words = value.split_whitespace();
@@ -200,7 +241,15 @@ mod tests {
             jumps: vec![
                 Jumps { device: "V_x".into(), times: vec![0.1, 0.3], ..Jumps::default() },
                 Jumps { device: "V_p".into(), rise: true, fall: true, ..Jumps::default() },
+                Jumps { device: "V_n".into(), steps: true, ..Jumps::default() },
             ],
+            samples: vec![Sample {
+                switch: "S_y".into(),
+                capacitor: "C_y".into(),
+                clock: "V_y_clock".into(),
+                period: 0.01,
+                round: 1,
+            }],
             domains: vec![DomainVariables {
                 domain: "hydraulic".into(),
                 effort: 1e6,

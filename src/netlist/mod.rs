@@ -137,6 +137,13 @@ pub enum Element {
         gain: Expr,
         control: Name,
     },
+    /// A lossless line: the nodes of its near port, then those of its far one.
+    Line {
+        impedance: Expr,
+        delay: Expr,
+        /// Voltage and current of each port at the start.
+        initial: Option<[Expr; 4]>,
+    },
     /// `B … V=`, `E … VALUE={}`.
     BehaviouralVoltage {
         law: Expr,

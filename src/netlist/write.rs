@@ -158,6 +158,14 @@ fn device_words(names: &Names, device: &Device) -> Vec<String> {
             words.push(name(control));
             words.push(value(names, gain));
         }
+        Element::Line { impedance, delay, initial } => {
+            words.push(format!("Z0={}", value(names, impedance)));
+            words.push(format!("TD={}", value(names, delay)));
+            words.extend(initial.as_ref().map(|initial| {
+                let values: Vec<String> = initial.iter().map(|v| value(names, v)).collect();
+                format!("IC={}", values.join(","))
+            }));
+        }
         Element::BehaviouralVoltage { law: expr } => words.extend(law("V", expr)),
         Element::BehaviouralCurrent { law: expr } => words.extend(law("I", expr)),
         Element::Switch { model, control, on } => {

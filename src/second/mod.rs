@@ -5,11 +5,13 @@
 //! steps are allowed the stated part of these sizes as error, for every unknown.
 
 pub mod energy;
+pub mod events;
+mod memories;
 pub mod radau;
 
 use crate::bond::causality::Causality;
 use crate::bond::consistent;
-use crate::bond::equations::compiled::Readings;
+use crate::bond::equations::compiled::{Compiled, Readings};
 use crate::bond::equations::{Formula, Input, Unknown};
 use crate::bond::graph::BondGraph;
 use crate::bond::initial;
@@ -17,7 +19,9 @@ use crate::bond::prepared::{self, Prepared};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Node, Unary};
 use energy::{Energy, Meter};
-use radau::{B, Radau, Statistics, Step, Stop};
+use events::Conditions;
+use memories::Memories;
+use radau::{B, Radau, Statistics, Step, Stop, Verdict};
 
 /// How to run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,54 +101,57 @@ pub fn integrate(
         let pilot = Settings { tolerance: 1e-4f64.max(settings.tolerance), ..*settings };
         let mut nothing = |_: &Event| {};
         let outcome =
-            march(&mut prepared, &run.corners, &start, &mut sizes, &pilot, true, &mut nothing);
-        if let Err(failure) = outcome {
-            failed = Some(failure);
-        } else {
-            let mut row = vec![0.0; start.len()];
-            let mut next = 0;
-            let mut observe = |event: &Event| match event {
-                Event::Step { step, from, to } => {
-                    for (stage, b) in step.stages.iter().zip(B) {
-                        row.iter_mut()
-                            .zip(step.start.iter().zip(stage))
-                            .for_each(|(r, (y, z))| *r = y + z);
-                        meter.add(b * step.h, &row);
-                    }
-                    let near = 1e-12 * until;
-                    let stop = step.t + step.h;
-                    while next < times.len()
-                        && times[next] <= stop
-                        && (times[next] < to - near || *to >= until)
-                    {
-                        step.at(times[next], &mut row);
-                        if times[next] <= step.t {
-                            row.copy_from_slice(step.start);
+            march(&mut prepared, &run.corners, &start, &mut sizes, &pilot, None, &mut nothing);
+        match outcome {
+            Err(failure) => failed = Some(failure),
+            Ok((_, known)) => {
+                let mut row = vec![0.0; start.len()];
+                let mut next = 0;
+                let mut observe = |event: &Event| match event {
+                    Event::Step { step, from, to, ends, compiled } => {
+                        for (stage, b) in step.stages.iter().zip(B) {
+                            row.iter_mut()
+                                .zip(step.start.iter().zip(stage))
+                                .for_each(|(r, (y, z))| *r = y + z);
+                            meter.add(b * step.h, &row);
                         }
-                        meter.check(&row);
-                        run.columns[0].push(times[next]);
-                        let values = readings.read(times[next], 0.5 * (from + to), &row);
-                        for ((column, value), factor) in
-                            run.columns[1..].iter_mut().zip(values).zip(&factors)
+                        let near = 1e-12 * until;
+                        // At the end of a segment, and where a condition changes, the later values hold.
+                        let stop = step.t + step.h - if *ends { near } else { 0.0 };
+                        readings.follow(compiled);
+                        while next < times.len()
+                            && times[next] <= stop
+                            && (times[next] < to - near || *to >= until)
                         {
-                            column.push(value / factor);
+                            step.at(times[next], &mut row);
+                            if times[next] <= step.t {
+                                row.copy_from_slice(step.start);
+                            }
+                            meter.check(&row);
+                            run.columns[0].push(times[next]);
+                            let values = readings.read(times[next], 0.5 * (from + to), &row);
+                            for ((column, value), factor) in
+                                run.columns[1..].iter_mut().zip(values).zip(&factors)
+                            {
+                                column.push(value / factor);
+                            }
+                            next += 1;
                         }
-                        next += 1;
                     }
+                    Event::End(y) => end.copy_from_slice(y),
+                };
+                match march(
+                    &mut prepared,
+                    &run.corners,
+                    &start,
+                    &mut sizes,
+                    settings,
+                    Some(&known),
+                    &mut observe,
+                ) {
+                    Ok((statistics, _)) => run.statistics = statistics,
+                    Err(failure) => failed = Some(failure),
                 }
-                Event::End(y) => end.copy_from_slice(y),
-            };
-            match march(
-                &mut prepared,
-                &run.corners,
-                &start,
-                &mut sizes,
-                settings,
-                false,
-                &mut observe,
-            ) {
-                Ok(statistics) => run.statistics = statistics,
-                Err(failure) => failed = Some(failure),
             }
         }
     }
@@ -165,7 +172,8 @@ pub fn integrate(
 /// What a run reports while it goes.
 enum Event<'a> {
     /// An accepted step within the segment `from..to`.
-    Step { step: &'a Step<'a>, from: f64, to: f64 },
+    /// Whether it ends on an event, and the equations with their conditions held.
+    Step { step: &'a Step<'a>, from: f64, to: f64, ends: bool, compiled: &'a Compiled },
     /// The values at the end.
     End(&'a [f64]),
 }
@@ -183,51 +191,115 @@ fn march(
     start: &[f64],
     sizes: &mut Sizes,
     settings: &Settings,
-    pilot: bool,
+    known: Option<&Conditions>,
     report: &mut dyn FnMut(&Event),
-) -> Result<Statistics, Failure> {
+) -> Result<(Statistics, Conditions), Failure> {
+    // What is known of the conditions comes from a pilot run.
+    let pilot = known.is_none();
     let mut y = start.to_vec();
     let mut statistics = Statistics::default();
     let mut h = None;
-    for pair in corners.windows(2) {
-        let (from, to) = (pair[0], pair[1]);
-        if from > 0.0 {
-            let inside = 0.5 * (from + to);
-            consistent::settle(
-                &mut prepared.compiled,
-                &prepared.structure,
-                from,
-                inside,
-                to - from,
-                &mut y,
-            )
-            .map_err(|trouble| Failure::Restart { t: from, trouble })?;
+    let first_end = corners.get(1).copied().unwrap_or(0.0);
+    let until = corners.last().copied().unwrap_or(0.0);
+    let mut conditions = Conditions::new(&mut prepared.compiled, until, 0.5 * first_end, &y);
+    if let Some(known) = known {
+        conditions.learn(known);
+    }
+    let memories = Memories::new(&prepared.equations, start, until);
+    let mut corners = corners.to_vec();
+    let mut next = 0;
+    while let Some(&[from, to]) = corners.get(next..next + 2) {
+        next += 1;
+        let inside = 0.5 * (from + to);
+        let Prepared { compiled, structure, equations } = &mut *prepared;
+        if from > 0.0 || !conditions.is_empty() {
+            let mut settle = |y: &mut [f64]| {
+                conditions.settle(compiled, structure, from, [from, to], y)?;
+                while memories.flip(&conditions) {
+                    conditions.settle(compiled, structure, from, [from, to], y)?;
+                }
+                Ok(())
+            };
+            let settled = match from > 0.0 {
+                true => equations.take(from, inside, memories.room, &mut y, &mut settle),
+                false => settle(&mut y),
+            };
+            settled.map_err(|trouble| Failure::Restart { t: from, trouble })?;
             sizes.see(&y);
         }
-        let weights = sizes.weights(settings.tolerance, pilot);
-        let mut radau = Radau::new(&mut prepared.compiled, weights);
-        radau.growing = if pilot { settings.tolerance } else { 0.0 };
-        if pilot {
-            radau.mind_rounding(from, to, &y);
+        let mut t = from;
+        while t < to {
+            let weights = sizes.weights(settings.tolerance, pilot);
+            conditions.see_noise(compiled, t, inside, &y, &weights);
+            let mut radau = Radau::new(compiled, weights);
+            radau.growing = if pilot { settings.tolerance } else { 0.0 };
+            if pilot {
+                radau.mind_rounding(from, to, &y);
+            }
+            radau.longest = memories.longest;
+            radau.maximum_steps = settings.maximum_steps.saturating_sub(statistics.accepted);
+            let first = first_step(&mut radau, [t, from, to], &y, h);
+            let mut reached = t;
+            let was_loose = conditions.loose;
+            let outcome = radau.segment([t, from, to], &mut y, first, &mut |compiled, step| {
+                let verdict = conditions.judge(compiled, step, inside);
+                if !matches!(verdict, Verdict::Again(_)) {
+                    let ends = verdict == Verdict::End && step.t + step.h < to;
+                    sizes.see(step.start);
+                    memories.extend(step, (from, to));
+                    report(&Event::Step { step, from, to, ends, compiled });
+                    reached = step.t + step.h;
+                }
+                verdict
+            });
+            statistics.add(&radau.statistics);
+            sizes.see(&y);
+            let ended = match outcome {
+                Ok(ended) => ended,
+                // A branch may have no values past its threshold, where the other one has.
+                Err(Stop::StepTooSmall { .. }) if !was_loose && !conditions.is_empty() => {
+                    conditions.let_go(compiled);
+                    t = reached;
+                    continue;
+                }
+                Err(stop) => return Err(Failure::Stop(stop)),
+            };
+            (t, h) = (ended.t, Some(ended.h));
+            if t < to {
+                conditions
+                    .pass(compiled, structure, t, [from, to], &mut y)
+                    .map_err(|trouble| Failure::Restart { t, trouble })?;
+                while memories.flip(&conditions) {
+                    conditions
+                        .settle(compiled, structure, t, [from, to], &mut y)
+                        .map_err(|trouble| Failure::Restart { t, trouble })?;
+                }
+                sizes.see(&y);
+                if memories.any_delay() {
+                    // What jumps here jumps again when a delay is over: the rest is segments of their own.
+                    let echoes = memories.echoes(t, until);
+                    corners.insert(next, t);
+                    for echo in echoes {
+                        let at = corners.partition_point(|corner| *corner < echo - memories.room);
+                        if corners.get(at).is_none_or(|corner| *corner > echo + memories.room) {
+                            corners.insert(at, echo);
+                        }
+                    }
+                    break;
+                }
+            }
         }
-        radau.maximum_steps = settings.maximum_steps.saturating_sub(statistics.accepted);
-        let first = first_step(&mut radau, from, to, &y, h);
-        let outcome = radau.segment(from, to, &mut y, first, &mut |step| {
-            sizes.see(step.start);
-            report(&Event::Step { step, from, to });
-        });
-        statistics.add(&radau.statistics);
-        sizes.see(&y);
-        h = Some(outcome.map_err(Failure::Stop)?);
     }
+    statistics.events = conditions.events;
     report(&Event::End(&y));
-    Ok(statistics)
+    Ok((statistics, conditions))
 }
 
 /// A first step within which no state moves by more than a small part of what is allowed times a hundred.
-fn first_step(radau: &mut Radau, from: f64, to: f64, y: &[f64], last: Option<f64>) -> f64 {
+fn first_step(radau: &mut Radau, [start, from, to]: [f64; 3], y: &[f64], last: Option<f64>) -> f64 {
     let mut f = vec![0.0; y.len()];
-    radau.compiled.residual(from, 0.5 * (from + to), y, &mut f);
+    radau.compiled.residual(start, 0.5 * (from + to), y, &mut f);
+    let from = start;
     let fastest = (0..radau.compiled.states)
         .map(|k| (f[k] / (100.0 * radau.weights[k])).abs())
         .filter(|rate| rate.is_finite())

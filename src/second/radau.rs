@@ -64,6 +64,7 @@ pub struct Statistics {
     pub diverged: usize,
     pub evaluations: usize,
     pub factorisations: usize,
+    pub events: usize,
 }
 
 impl Statistics {
@@ -91,6 +92,26 @@ pub enum Stop {
     TooManySteps { t: f64 },
 }
 
+/// What is to become of a step that error control has accepted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// It is kept.
+    Keep,
+    /// It is kept, and the segment ends with it.
+    End,
+    /// It is taken again with this length.
+    Again(f64),
+}
+
+/// Where a segment ended, and the length that error control would choose next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ended {
+    /// The time.
+    pub t: f64,
+    /// The next step.
+    pub h: f64,
+}
+
 /// An accepted step.
 pub struct Step<'a> {
     /// Its start.
@@ -106,7 +127,11 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// The collocation polynomial at `t`.
     pub fn at(&self, t: f64, y: &mut [f64]) {
-        let x = (t - self.t) / self.h;
+        self.part((t - self.t) / self.h, y);
+    }
+
+    /// The collocation polynomial at a part of the step, of as many unknowns as there is room for.
+    pub fn part(&self, x: f64, y: &mut [f64]) {
         let weights: Vec<f64> =
             (0..3).map(|j| x * (P[j][0] + x * (P[j][1] + x * P[j][2]))).collect();
         for (i, value) in y.iter_mut().enumerate() {
@@ -130,6 +155,8 @@ pub struct Radau<'a> {
     pub statistics: Statistics,
     /// Attempts after which a run is given up.
     pub maximum_steps: usize,
+    /// No step is longer: what a delay gives within it must be past.
+    pub longest: f64,
     real: Option<Lu<f64>>,
     complex: Option<Lu<Complex>>,
     real_values: Vec<f64>,
@@ -150,6 +177,7 @@ impl<'a> Radau<'a> {
             growing: 0.0,
             statistics: Statistics::default(),
             maximum_steps: 20_000_000,
+            longest: f64::INFINITY,
             real: None,
             complex: None,
             real_values: vec![0.0; entries],
@@ -194,20 +222,20 @@ impl<'a> Radau<'a> {
         }
     }
 
-    /// Integrates from `from` to exactly `to` within one segment, starting from the consistent values `y` with a first
-    /// step of `first`; `accept` sees each step. Returns the length that error control would choose next.
+    /// Integrates from `start` to exactly `to` within the segment `from..to`, starting from the consistent values `y` with
+    /// a first step of `first`; `accept` judges each step.
     pub fn segment(
         &mut self,
-        from: f64,
-        to: f64,
+        [start, from, to]: [f64; 3],
         y: &mut [f64],
         first: f64,
-        accept: &mut dyn FnMut(&Step),
-    ) -> Result<f64, Stop> {
+        accept: &mut dyn FnMut(&mut Compiled, &Step) -> Verdict,
+    ) -> Result<Ended, Stop> {
         let n = self.compiled.n;
         let inside = 0.5 * (from + to);
         let smallest = 4.0 * f64::EPSILON * to.abs().max(to - from);
-        let (mut t, mut h) = (from, first.min(to - from));
+        let (mut t, mut h) = (start, first.min(to - start));
+        let mut asked: Option<f64> = None;
         let mut f = vec![0.0; n];
         let mut jacobian = vec![0.0; self.compiled.pattern.len()];
         let mut stages: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; n]);
@@ -225,8 +253,13 @@ impl<'a> Radau<'a> {
                 fresh = false;
             }
             let remaining = to - t;
-            let ends = h >= remaining * (1.0 - 1e-10);
-            let step = if ends { remaining } else { h.min(0.5 * remaining) };
+            h = h.min(self.longest);
+            let ends = asked.is_none() && h >= remaining * (1.0 - 1e-10);
+            let step = match asked.take() {
+                Some(asked) => asked,
+                None if ends => remaining,
+                None => h.min(0.5 * remaining),
+            };
             if h < smallest {
                 return Err(Stop::StepTooSmall { t, unknown: self.worst(&stages[2]) });
             }
@@ -268,8 +301,13 @@ impl<'a> Radau<'a> {
                 h = step * if factor.is_nan() { 0.2 } else { factor.clamp(0.2, 0.9) };
                 continue;
             }
+            let verdict = accept(self.compiled, &Step { t, h: step, start: y, stages: &stages });
+            if let Verdict::Again(shorter) = verdict {
+                self.statistics.rejected += 1;
+                asked = Some(shorter);
+                continue;
+            }
             self.statistics.accepted += 1;
-            accept(&Step { t, h: step, start: y, stages: &stages });
             last = Some((step, error.max(1e-3)));
             let start = y.to_vec();
             y.iter_mut().zip(&stages[2]).for_each(|(y, z)| *y += z);
@@ -284,8 +322,11 @@ impl<'a> Radau<'a> {
             // A step that the segment's end cut short says nothing against a longer one.
             h = if step < h { grown.max(h) } else { grown };
             (fresh, after_rejection) = (true, false);
+            if verdict == Verdict::End {
+                break;
+            }
         }
-        Ok(h)
+        Ok(Ended { t, h })
     }
 
     /// Factors γ/h·M − J and (α + iβ)/h·M − J.

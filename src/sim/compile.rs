@@ -3,6 +3,7 @@
 use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
 use super::laws::LawSet;
+use super::memory::MemoryData;
 use super::reduce;
 use super::system::{Guard, LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
 use crate::circuit::DeviceId;
@@ -242,6 +243,9 @@ impl<'a> Builder<'a> {
                     *b = b.zip(fixed).map(|(b, value)| b + factor * value);
                 }
             }
+            for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
+                constant[row.0 as usize] = None;
+            }
             let mut charges = self.charge_entries.clone();
             charges.extend(curved_charges.iter().map(|(k, input)| (*k, *input, 1.5)));
             let found = reduce::constraint(&reduce::Parts {
@@ -331,6 +335,31 @@ impl<'a> Builder<'a> {
         let nodes: Vec<NodeId> =
             columns.iter().map(|(_, law)| conditions.add_output(&mut dag, law, &inputs)).collect();
         let output_laws = LawSet::without_derivatives(&dag, &nodes);
+        let mut dag = Dag::default();
+        let inputs = stamps.memories.iter().map(|memory| {
+            let added: Result<NodeId, std::convert::Infallible> =
+                dag.add(&memory.input, &mut |dag, leaf, _| {
+                    // What is remembered is a sum of unknowns.
+                    Ok(match leaf {
+                        Leaf::Unknown(k) => dag.input(k.0),
+                        _ => dag.constant(0.0),
+                    })
+                });
+            let Ok(node) = added;
+            node
+        });
+        let inputs: Vec<NodeId> = inputs.collect();
+        let memory_inputs = LawSet::without_derivatives(&dag, &inputs);
+        let memories = stamps
+            .memories
+            .iter()
+            .map(|memory| MemoryData {
+                device: memory.device,
+                kind: memory.kind,
+                into: memory.into.iter().map(|(row, factor)| (row.0, *factor)).collect(),
+                initial: memory.initial,
+            })
+            .collect();
         System {
             time_input: time,
             nodes: stamps.nodes,
@@ -358,6 +387,8 @@ impl<'a> Builder<'a> {
             mode_slots,
             controls,
             output_laws,
+            memories,
+            memory_inputs,
             output_rates,
             dynamic,
             frozen,

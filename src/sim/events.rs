@@ -78,11 +78,16 @@ impl Default for Track {
 }
 
 impl Track {
+    /// Takes over what another run has seen of the guard's range.
+    pub(crate) fn learn(&mut self, other: &Track) {
+        (self.low, self.high, self.size) = (other.low, other.high, other.size);
+    }
+
     fn spread(&self) -> f64 {
         (self.high - self.low).max(0.0)
     }
 
-    fn see(&mut self, a: f64, b: f64) {
+    pub(crate) fn see(&mut self, a: f64, b: f64) {
         let value = a - b;
         self.low = self.low.min(value);
         self.high = self.high.max(value);
@@ -348,7 +353,8 @@ impl Network<'_> {
     pub(crate) fn ramp(&mut self, mode: usize, a: f64, b: f64) -> f64 {
         let track = &self.tracks[mode];
         let spread = if track.spread() > 0.0 { track.spread() } else { track.size };
-        let width = RAMP * spread.max(16.0 * self.room(mode)).max(f64::MIN_POSITIVE / RAMP);
+        let noise = track.noise / NOISE;
+        let width = (RAMP * spread).max(noise).max(f64::MIN_POSITIVE / ROUNDING);
         self.set_ramp(mode, a, b, width);
         width
     }

@@ -9,6 +9,7 @@ mod conditions;
 mod events;
 mod explain;
 mod laws;
+mod memory;
 pub mod methods;
 mod network;
 mod newton;

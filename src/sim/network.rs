@@ -4,6 +4,7 @@
 
 use super::events::Track;
 use super::laws::Registers;
+use super::memory::Memories;
 use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
 use crate::circuit::waveform::Segment;
@@ -88,6 +89,7 @@ pub(crate) struct Network<'a> {
     /// Pins the nodes of `.ic` to their values, while an operating point is sought.
     pub pin_initial: bool,
     pub statistics: Statistics,
+    pub memories: Memories,
     inputs: Vec<f64>,
     control_registers: Registers,
     output_registers: Registers,
@@ -121,6 +123,7 @@ impl<'a> Network<'a> {
             drive: 1.0,
             pin_initial: false,
             statistics: Statistics::default(),
+            memories: Memories::new(system),
             inputs: vec![0.0; system.inputs()],
             control_registers: system.controls.registers(),
             output_registers: system.output_laws.registers(),
@@ -135,7 +138,7 @@ impl<'a> Network<'a> {
     pub fn next_corner(&self) -> f64 {
         let sources = self.segments.iter().map(|segment| segment.end);
         let clocks = self.tracks.iter().map(|track| track.next);
-        sources.chain(clocks).fold(f64::INFINITY, f64::min)
+        sources.chain(clocks).fold(self.memories.next_corner(), f64::min)
     }
 
     /// Moves each source whose segment ends at or just before `t` to its next one, and conditions over time on.
@@ -147,8 +150,19 @@ impl<'a> Network<'a> {
                 corner = true;
             }
         }
-        self.statistics.corners += u64::from(corner);
+        let events = self.statistics.events;
         self.set_clocks(t, Some(slack));
+        let new = corner || self.statistics.events != events;
+        corner |= self.memories.pass_corner(t, slack, new);
+        self.statistics.corners += u64::from(corner);
+    }
+
+    /// Inputs of the memories at a point.
+    pub fn read_memories(&mut self, x: &[f64], t: f64) {
+        if !self.memories.is_empty() {
+            self.set_inputs(x, t);
+            self.memories.read(&self.system.memory_inputs, &self.inputs);
+        }
     }
 
     fn set_inputs(&mut self, x: &[f64], t: f64) {
@@ -257,6 +271,12 @@ impl<'a> Network<'a> {
                 r[*row as usize] -= factor * value;
             }
         }
+        for (k, memory) in self.system.memories.iter().enumerate() {
+            let value = self.drive * self.memories.value(k, t);
+            for (row, factor) in &memory.into {
+                r[*row as usize] -= factor * value;
+            }
+        }
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
             for (value, target) in state.values.iter().zip(&group.targets) {
                 if let Target::Equations(into) = target {
@@ -292,6 +312,12 @@ impl<'a> Network<'a> {
         for (segment, source) in self.segments.iter().zip(&self.system.sources) {
             let value = segment.value(t).abs();
             for (row, factor) in &source.into {
+                s[*row as usize] += factor.abs() * value;
+            }
+        }
+        for (k, memory) in self.system.memories.iter().enumerate() {
+            let value = self.memories.value(k, t).abs();
+            for (row, factor) in &memory.into {
                 s[*row as usize] += factor.abs() * value;
             }
         }
@@ -352,6 +378,12 @@ impl<'a> Network<'a> {
         for (segment, source) in self.segments.iter().zip(&self.system.sources) {
             let slope = segment.derivative(t);
             for (row, factor) in &source.into {
+                s[*row as usize] += factor * slope;
+            }
+        }
+        for (k, memory) in self.system.memories.iter().enumerate() {
+            let slope = self.memories.slope(k, t);
+            for (row, factor) in &memory.into {
                 s[*row as usize] += factor * slope;
             }
         }

@@ -56,11 +56,16 @@ pub(crate) struct Rows<'a> {
     left: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
-    point: State,
+    inside: Inside,
+}
+
+/// Values of all unknowns at times within an accepted step.
+pub(crate) struct Inside {
+    pub point: State,
     /// Charges that are states.
     held: Vec<bool>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
-    factorised: Option<bool>,
+    pub factorised: Option<bool>,
 }
 
 impl<'a> Rows<'a> {
@@ -80,9 +85,7 @@ impl<'a> Rows<'a> {
             left: vec![0.0; columns + 1],
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
-            point: State::new(0.0, system.equations(), system.charges()),
-            held: system.held.clone(),
-            factorised: None,
+            inside: Inside::new(network),
         }
     }
 
@@ -128,8 +131,14 @@ impl<'a> Rows<'a> {
                 return Ok(());
             }
             self.next += 1;
-            self.point.copy_from(state);
-            self.finish_point(network, due, index2 || !network.system.output_rates, weights, work)?;
+            self.inside.point.copy_from(state);
+            self.inside.finish_point(
+                network,
+                due,
+                index2 || !network.system.output_rates,
+                weights,
+                work,
+            )?;
             self.write(network, due)?;
         }
     }
@@ -144,14 +153,14 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.factorised = None;
+        self.inside.factorised = None;
         loop {
             let due = self.next_time();
             if due >= to.t - self.slack {
                 return Ok(());
             }
             self.next += 1;
-            self.between(network, from, to, due, index2, weights, work)?;
+            self.inside.between(network, from, to, due, index2, weights, work)?;
             self.write(network, due)?;
         }
     }
@@ -171,10 +180,16 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.factorised = None;
-        self.point.copy_from(state);
-        self.finish_point(network, state.t, index2 || !network.system.output_rates, weights, work)?;
-        self.point.t = state.t;
+        self.inside.factorised = None;
+        self.inside.point.copy_from(state);
+        self.inside.finish_point(
+            network,
+            state.t,
+            index2 || !network.system.output_rates,
+            weights,
+            work,
+        )?;
+        self.inside.point.t = state.t;
         self.evaluate(network, time);
         if time >= self.start - self.slack {
             self.send(network)?;
@@ -194,12 +209,18 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.factorised = None;
+        self.inside.factorised = None;
         if to.t < self.start {
             return Ok(());
         }
-        self.point.copy_from(to);
-        self.finish_point(network, to.t, index2 || !network.system.output_rates, weights, work)?;
+        self.inside.point.copy_from(to);
+        self.inside.finish_point(
+            network,
+            to.t,
+            index2 || !network.system.output_rates,
+            weights,
+            work,
+        )?;
         self.evaluate(network, to.t);
         self.widen();
         // Pieces are halved from the left; what is still to come lies on a pile: its right end, how often it has been
@@ -215,7 +236,7 @@ impl<'a> Rows<'a> {
                 let thetas: &[f64] = if halved < 2 { &[0.3, 0.5] } else { &[0.5] };
                 for theta in thetas {
                     let time = left[0] + theta * span;
-                    self.between(network, from, to, time, index2, weights, work)?;
+                    self.inside.between(network, from, to, time, index2, weights, work)?;
                     self.evaluate(network, time);
                     self.widen();
                     off = self.off_line(*theta, &left, &right).max(off);
@@ -260,9 +281,48 @@ impl<'a> Rows<'a> {
         most
     }
 
+    fn evaluate(&mut self, network: &mut Network, time: f64) {
+        self.row[0] = time;
+        network.outputs(
+            &self.inside.point.x,
+            &self.inside.point.w,
+            self.inside.point.t,
+            &mut self.row[1..],
+        );
+    }
+
+    fn write(&mut self, network: &mut Network, time: f64) -> Result<(), Stopped> {
+        self.evaluate(network, time);
+        self.send(network)
+    }
+
+    fn send(&mut self, network: &mut Network) -> Result<(), Stopped> {
+        network.statistics.rows += 1;
+        for value in &mut self.row {
+            // −0 becomes 0.
+            *value += 0.0;
+        }
+        if self.row.iter().any(|value| !value.is_finite()) {
+            let device = network.non_finite_law();
+            return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
+        }
+        Ok(self.sink.row(&self.row)?)
+    }
+}
+
+impl Inside {
+    pub fn new(network: &Network) -> Inside {
+        let system = network.system;
+        Inside {
+            point: State::new(0.0, system.equations(), system.charges()),
+            held: system.held.clone(),
+            factorised: None,
+        }
+    }
+
     /// Puts the values at a time inside a step into `self.point`.
     #[allow(clippy::too_many_arguments)]
-    fn between(
+    pub fn between(
         &mut self,
         network: &mut Network,
         from: &State,
@@ -314,7 +374,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`.
-    fn finish_point(
+    pub fn finish_point(
         &mut self,
         network: &mut Network,
         time: f64,
@@ -337,6 +397,7 @@ impl<'a> Rows<'a> {
         }
         Ok(())
     }
+
     /// Whether the correction came to its end; an error where there are no finite values.
     fn correct(
         &mut self,
@@ -382,28 +443,5 @@ impl<'a> Rows<'a> {
             return Ok(false);
         }
         Err(Cut::NonFinite { device: network.non_finite_law() })
-    }
-
-    fn evaluate(&mut self, network: &mut Network, time: f64) {
-        self.row[0] = time;
-        network.outputs(&self.point.x, &self.point.w, self.point.t, &mut self.row[1..]);
-    }
-
-    fn write(&mut self, network: &mut Network, time: f64) -> Result<(), Stopped> {
-        self.evaluate(network, time);
-        self.send(network)
-    }
-
-    fn send(&mut self, network: &mut Network) -> Result<(), Stopped> {
-        network.statistics.rows += 1;
-        for value in &mut self.row {
-            // −0 becomes 0.
-            *value += 0.0;
-        }
-        if self.row.iter().any(|value| !value.is_finite()) {
-            let device = network.non_finite_law();
-            return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
-        }
-        Ok(self.sink.row(&self.row)?)
     }
 }

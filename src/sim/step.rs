@@ -1,6 +1,7 @@
 //! A transient run: steps of controlled error from corner to corner, restarts, events, rows.
 
 mod crossing;
+mod past;
 mod restart;
 mod rows;
 
@@ -11,7 +12,7 @@ use super::methods::{self, Method, Work};
 use super::network::Network;
 use super::newton::Cut;
 use super::op::{self, State, Trouble};
-use super::output::Rows;
+use super::output::{Inside, Rows};
 use super::settings::{Settings, Tolerance};
 use super::statistics::Statistics;
 use super::system::System;
@@ -40,10 +41,12 @@ pub fn operating_point(system: &System) -> Result<OperatingPoint, Failure> {
     network.start_modes(0.0);
     let mut state = op::initial_values(&mut network, 0.0);
     let mut slides = vec![];
-    op::operating_point(&mut network, &mut state, &floors, &mut slides, &mut work.scratch)
-        .map_err(|trouble| {
-            failure(system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
-        })?;
+    past::at_rest(&mut network, &mut state, |network, state| {
+        op::operating_point(network, state, &floors, &mut slides, &mut work.scratch)
+    })
+    .map_err(|trouble| {
+        failure(system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
+    })?;
     let mut outputs = vec![0.0; system.outputs.len()];
     network.outputs(&state.x, &state.w, 0.0, &mut outputs);
     Ok(OperatingPoint { outputs, unknowns: state.x, statistics: network.statistics })
@@ -66,15 +69,19 @@ pub fn transient(
         let coarse = Settings { reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
         let mut run = Run::new(system, &coarse, None, None);
         match run.run() {
-            Ok(()) => pilot = Some((run.largest, run.network.statistics)),
+            Ok(()) => {
+                pilot = Some((run.largest, run.network.statistics, run.network.tracks));
+            }
             Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
             // The real run will say what is wrong, if anything is.
             Err(_) => {}
         }
     }
-    let magnitudes = pilot.as_ref().map(|(largest, _)| largest.as_slice());
+    let magnitudes = pilot.as_ref().map(|(largest, ..)| largest.as_slice());
     let mut run = Run::new(system, settings, magnitudes, Some(sink));
-    if let Some((_, statistics)) = &pilot {
+    if let Some((_, statistics, tracks)) = &pilot {
+        let known = run.network.tracks.iter_mut().zip(tracks);
+        known.for_each(|(track, known)| track.learn(known));
         run.network.statistics.add_work(statistics);
         run.network.statistics.pilot = statistics.accepted;
     }
@@ -103,6 +110,8 @@ struct Run<'a> {
     network: Network<'a>,
     settings: &'a Settings,
     rows: Option<Rows<'a>>,
+    /// Room for values within a step, for delays.
+    inside: Inside,
     method: Method,
     /// a_i, m_i and a_i + reltol·m_i (infinite where an unknown is not tested).
     absolute: Vec<f64>,
@@ -166,6 +175,7 @@ impl<'a> Run<'a> {
             }
         });
         Run {
+            inside: Inside::new(&network),
             rows,
             method: settings.method,
             absolute: absolute.collect(),
@@ -223,6 +233,7 @@ impl<'a> Run<'a> {
         let remaining = corner - self.state.t;
         let mut power = self.method.error_power();
         let limit = self.settings.hmax.unwrap_or(f64::INFINITY).min(self.sight);
+        let limit = limit.min(self.network.memories.longest_step());
         let planned = self.h.min(limit);
         let mut h = planned;
         let mut bounded = false;
@@ -382,6 +393,7 @@ impl<'a> Run<'a> {
             };
             outcome.map_err(|stopped| self.row_failure(stopped))?;
         }
+        self.remember()?;
         self.work.remember(&self.state);
         self.work.linearised = false;
         std::mem::swap(&mut self.state, &mut self.next);
@@ -389,6 +401,7 @@ impl<'a> Run<'a> {
             self.network.see_guards(&self.controls.right);
             std::mem::swap(&mut self.controls.left, &mut self.controls.right);
         }
+        self.network.memories.forget(self.state.t);
         self.weigh();
         self.row_here()?;
         let report = self.rows.is_some() && self.network.statistics.accepted.is_multiple_of(64);

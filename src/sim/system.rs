@@ -12,6 +12,7 @@
 
 use super::clocks::Clock;
 use super::laws::LawSet;
+use super::memory::MemoryData;
 use crate::circuit::stamps::{DeviceLabel, Junction, Unknown};
 use crate::circuit::{DeviceId, Waveform};
 use crate::linear::Pattern;
@@ -208,6 +209,8 @@ pub struct System {
     pub(crate) held: Vec<bool>,
     pub(crate) groups: Vec<LawGroup>,
     pub(crate) sources: Vec<Source>,
+    pub(crate) memories: Vec<MemoryData>,
+    pub(crate) memory_inputs: LawSet,
     pub(crate) modes: Vec<ModeData>,
     /// Number of inputs that modes, holds and slopes are.
     pub(crate) mode_slots: usize,
@@ -325,6 +328,12 @@ impl fmt::Display for System {
                 write!(f, " {value:+e}")?;
                 empty = false;
             }
+            for (s, memory) in self.memories.iter().enumerate() {
+                for (_, factor) in memory.into.iter().filter(|(r, _)| *r as usize == row) {
+                    write!(f, " {factor:+}·m{s}")?;
+                    empty = false;
+                }
+            }
             for (s, source) in self.sources.iter().enumerate() {
                 for (_, factor) in source.into.iter().filter(|(r, _)| *r as usize == row) {
                     write!(f, " {factor:+}·b{s}(t)")?;
@@ -360,6 +369,9 @@ impl fmt::Display for System {
         }
         for (s, source) in self.sources.iter().enumerate() {
             writeln!(f, "b{s}: {:?}", source.waveform)?;
+        }
+        for memory in &self.memories {
+            writeln!(f, "memory of {}: {:?}", self.device_name(memory.device), memory.kind)?;
         }
         for mode in &self.modes {
             let device = self.device_name(mode.device);

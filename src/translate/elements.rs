@@ -8,8 +8,7 @@ use super::names::Namer;
 use super::series_parallel::Item;
 use super::values::{Speaker, Unreadable, negate, product, signed, tidy};
 use crate::bond::graph::{
-    self, BondGraph, BondId, End, Initial, Law, Leaf, SignalLaw, StoreInitial, StoreLaw, Variable,
-    VertexId,
+    self, BondGraph, BondId, End, Initial, Law, Leaf, StoreInitial, StoreLaw, Variable, VertexId,
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Node};
@@ -29,7 +28,7 @@ pub fn counters(graph: &BondGraph, forms: &[Form], namer: &mut Namer) -> Vec<Opt
         graph.vertex(id).law.expressions(&mut |expr| note(expr, Some(id)));
     }
     for signal in &graph.signals {
-        if let SignalLaw::Algebraic(expr) | SignalLaw::Integrator { rate: expr, .. } = &signal.law {
+        if let Some(expr) = signal.law.expression() {
             note(expr, None);
         }
     }

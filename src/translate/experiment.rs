@@ -126,6 +126,7 @@ impl Builder<'_> {
             grid: experiment.step,
             options,
             jumps: std::mem::take(&mut self.jumps),
+            samples: std::mem::take(&mut self.samples),
             domains: self.domain_variables(),
             columns,
         }

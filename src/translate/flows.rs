@@ -5,9 +5,7 @@ use super::forest::Forest;
 use super::forms::{Form, SourceValue, constant_value, form_at, is_constant};
 use super::islands::is_junction;
 use super::names::Namer;
-use crate::bond::graph::{
-    BondGraph, BondId, End, Expr, Law, Leaf, Power, SignalLaw, Variable, VertexId,
-};
+use crate::bond::graph::{BondGraph, BondId, End, Expr, Law, Leaf, Power, Variable, VertexId};
 use crate::netlist::Name;
 
 /// A device whose current is a flow, or its negative.
@@ -383,7 +381,7 @@ fn needs(graph: &BondGraph, forms: &[Form]) -> Vec<Need> {
         }
     }
     for signal in &graph.signals {
-        if let SignalLaw::Algebraic(expr) | SignalLaw::Integrator { rate: expr, .. } = &signal.law {
+        if let Some(expr) = signal.law.expression() {
             needs_of(graph, forms, expr, None, &mut |bond| {
                 needs.push(Need { bond, except: None, hard: false });
             });

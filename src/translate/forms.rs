@@ -202,11 +202,8 @@ impl Uses {
             vertex.law.expressions(&mut |expr| count(expr, &mut uses.laws));
         }
         for signal in &graph.signals {
-            match &signal.law {
-                SignalLaw::Algebraic(expr) | SignalLaw::Integrator { rate: expr, .. } => {
-                    count(expr, &mut uses.laws);
-                }
-                SignalLaw::Waveform(_) => {}
+            if let Some(expr) = signal.law.expression() {
+                count(expr, &mut uses.laws);
             }
         }
         for observation in &graph.experiment.observe {

@@ -89,11 +89,14 @@ pub fn translate(
         cards: Vec::new(),
         links: Vec::new(),
         jumps: Vec::new(),
+        samples: Vec::new(),
+        rounds: Vec::new(),
         couplers: 0,
     };
     builder.points = builder.name_points(junctions);
     let before = diagnostics.len();
     builder.check(diagnostics);
+    noise_lengths(graph, diagnostics);
     builder.parameter_cards();
     builder.island_cards(diagnostics);
     builder.coupling_cards();
@@ -134,6 +137,9 @@ struct Builder<'a> {
     /// By card of an element, in order: card, element, bond.
     links: Vec<map::Link>,
     jumps: Vec<crate::netlist::header::Jumps>,
+    samples: Vec<crate::netlist::header::Sample>,
+    /// By signal: the round in which a memory takes its value.
+    rounds: Vec<u32>,
     couplers: usize,
 }
 
@@ -245,5 +251,32 @@ impl Builder<'_> {
             span,
             comment: Some(comment),
         });
+    }
+}
+
+/// More random numbers than this are no netlist.
+const MOST_HELD: f64 = 1e5;
+
+/// Refuses noise whose numbers, written out to the end of the run, would be too many.
+fn noise_lengths(graph: &BondGraph, diagnostics: &mut Vec<Diagnostic>) {
+    let until = graph.experiment.until.unwrap_or(1.0);
+    for signal in &graph.signals {
+        let crate::bond::graph::SignalLaw::Waveform(crate::bond::graph::Waveform::Noise {
+            dt, ..
+        }) = &signal.law
+        else {
+            continue;
+        };
+        let count = until / forms::constant_value(graph, dt).unwrap_or(f64::NAN);
+        if count.is_nan() || count > MOST_HELD {
+            let message =
+                format!("`{}` holds {count:.0} random numbers until {until} s", signal.name);
+            diagnostics.push(
+                Diagnostic::error("E0603", signal.span, message)
+                    .says("too many for a netlist")
+                    .because(format!("a netlist writes each of them out, {MOST_HELD:.0} at most"))
+                    .help("hold each number for longer (`dt`), or end the run earlier"),
+            );
+        }
     }
 }

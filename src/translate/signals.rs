@@ -5,15 +5,24 @@ use super::elements::linked;
 use super::forms::{Form, Integrator, SourceValue, constant_value, is_constant};
 use super::values::{Speaker, Unreadable};
 use crate::bond::graph::{
-    BondGraph, Expr as GraphExpr, Initial, SignalId, SignalLaw, SignalOrigin, VertexId, Waveform,
+    BondGraph, Expr as GraphExpr, Initial, Leaf, Memory, SignalId, SignalLaw, SignalOrigin,
+    VertexId, Waveform,
 };
+use crate::bond::{memory, noise};
 use crate::diagnostic::Diagnostic;
-use crate::expr::Binary;
-use crate::netlist::header::Jumps;
-use crate::netlist::{self, Element, Expr, Name, Shape};
+use crate::expr::{Binary, Node};
+use crate::netlist::header::{Jumps, Sample};
+use crate::netlist::{self, Card, CardKind, Element, Expr, Name, Shape};
+use crate::source::Span;
 
 /// What a rise of 0 becomes for other simulators, in output intervals.
 const RISE: f64 = 1e-3;
+
+/// For other simulators: for how long a switch closes to sample, in parts of the period; into what capacitance, in
+/// farads; for how many time constants.
+const ACQUISITION: f64 = 1e-3;
+const HOLDS: f64 = 1e-6;
+const SETTLED: f64 = 30.0;
 
 /// Where a signal can be read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +50,7 @@ impl Builder<'_> {
     /// Adds the cards of all signals that stand in no source.
     pub(super) fn signal_cards(&mut self, diagnostics: &mut Vec<Diagnostic>) {
         let graph = self.graph;
+        self.rounds = memory::rounds(graph);
         let mut heading = false;
         for (index, signal) in graph.signals.iter().enumerate() {
             let Place::Node(node) = self.signal_places[index] else { continue };
@@ -105,6 +115,10 @@ impl Builder<'_> {
                 let initial = self.stated(stated, value);
                 self.integrator(state, rate, initial, signal.span, &what);
             }
+            SignalLaw::Memory { kind, input } => {
+                let input = self.value(input, None, card)?;
+                self.memory_cards(id, node, kind, input, &what);
+            }
             SignalLaw::Waveform(_) => {
                 let device = self.namer.device('V', &signal.name);
                 let value = self.waveform(id, device);
@@ -112,6 +126,139 @@ impl Builder<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The cards of a memory, whose value stands at `node`.
+    fn memory_cards(&mut self, id: SignalId, node: Name, kind: &Memory, input: Expr, what: &str) {
+        let graph = self.graph;
+        let (name, span) =
+            (graph.signals[id.index()].name.as_str(), graph.signals[id.index()].span);
+        let ground = self.ground();
+        let number = Expr::number;
+        let start = self.initial.signals.get(id.index()).copied().unwrap_or(0.0);
+        // A line loads what drives it: it may stand at the node of a signal, but not at one that carries power.
+        let is_signal = match &graph.signals[id.index()].law {
+            SignalLaw::Memory { input, .. } => match &*input.node {
+                Node::Leaf(Leaf::Signal(of)) => {
+                    matches!(self.signal_places.get(of.index()), Some(Place::Node(_)))
+                }
+                _ => false,
+            },
+            _ => false,
+        };
+        let source = match linked(&input, ground, false) {
+            Some(element @ Element::Vcvs { .. }) => element,
+            _ => Element::BehaviouralVoltage { law: input },
+        };
+        match kind {
+            Memory::Delay { by } => {
+                // A matched line, driven by the input, which is a signal: its far end is the input, later.
+                let near = match &source {
+                    Element::Vcvs { gain, control: [near, zero] }
+                        if is_signal && gain.as_number() == Some(1.0) && *zero == ground =>
+                    {
+                        *near
+                    }
+                    _ => {
+                        let near = self.namer.node(&format!("{name}_in"));
+                        let device = self.namer.device('E', &format!("{name}_in"));
+                        self.device(device, [near, ground], source, span, what);
+                        near
+                    }
+                };
+                let initial = [start, start, start, -start].map(number);
+                let delay = self.constant(by);
+                let line = Element::Line { impedance: number(1.0), delay, initial: Some(initial) };
+                let device = self.namer.device('T', name);
+                self.device_on(device, vec![near, ground, node, ground], line, span, what);
+                let device = self.namer.device('R', name);
+                let load = Element::Resistor { value: number(1.0) };
+                self.device(device, [node, ground], load, span, what);
+            }
+            Memory::Sample { period } => {
+                // A switch that a clock closes for a moment charges a capacitor; the header says that it is a memory.
+                let near = self.namer.node(&format!("{name}_in"));
+                let device = self.namer.device('E', &format!("{name}_in"));
+                self.device(device, [near, ground], source, span, what);
+                let every = constant_value(graph, period).unwrap_or(f64::NAN);
+                let open = ACQUISITION * every;
+                let clock = self.namer.node(&format!("{name}_clock"));
+                let clock_source = self.namer.device('V', &format!("{name}_clock"));
+                let edge = number(0.1 * open);
+                let [low, high, delay] = [0.0, 1.0, 0.0].map(number);
+                let width = number(open);
+                let arguments =
+                    vec![low, high, delay, edge.clone(), edge, width, self.constant(period)];
+                let waveform = netlist::Waveform::Function { shape: Shape::Pulse, arguments };
+                let element = Element::VoltageSource(waveform);
+                self.device(clock_source, [clock, ground], element, span, what);
+                let device = self.namer.device('S', name);
+                let values =
+                    [("vt", 0.5), ("vh", 0.0), ("ron", open / (SETTLED * HOLDS)), ("roff", 1e12)];
+                let values = values.map(|(key, value)| (key, number(value)));
+                let model = self.switch_model(device, values, span);
+                let switch = Element::Switch { model, control: [clock, ground], on: Some(false) };
+                self.device(device, [node, near], switch, span, what);
+                let capacitor = self.namer.device('C', name);
+                let element =
+                    Element::Capacitor { value: number(HOLDS), initial: Some(number(start)) };
+                self.device(capacitor, [node, ground], element, span, what);
+                let text = |name: Name| self.namer.names.text(name).to_string();
+                let sample = Sample {
+                    switch: text(device),
+                    capacitor: text(capacitor),
+                    clock: text(clock_source),
+                    period: every,
+                    round: self.rounds.get(id.index()).copied().unwrap_or(0),
+                };
+                self.samples.push(sample);
+            }
+            Memory::Hysteresis { low, high } => {
+                // A switch with hysteresis between 1 V and a load, and a comparison that makes 0 or 1 of it.
+                let control = match &source {
+                    Element::Vcvs { gain, control } if gain.as_number() == Some(1.0) => *control,
+                    _ => {
+                        let near = self.namer.node(&format!("{name}_in"));
+                        let device = self.namer.device('E', &format!("{name}_in"));
+                        self.device(device, [near, ground], source, span, what);
+                        [near, ground]
+                    }
+                };
+                let supply = self.namer.node(&format!("{name}_one"));
+                let device = self.namer.device('V', &format!("{name}_one"));
+                let one = Element::VoltageSource(netlist::Waveform::Constant(number(1.0)));
+                self.device(device, [supply, ground], one, span, what);
+                let device = self.namer.device('S', name);
+                let (low, high) = (self.constant(low), self.constant(high));
+                let middle = low.clone().binary(Binary::Add, high.clone());
+                let middle = folded(middle.binary(Binary::Divide, number(2.0)));
+                let half =
+                    folded(high.binary(Binary::Subtract, low).binary(Binary::Divide, number(2.0)));
+                let values =
+                    [("vt", middle), ("vh", half), ("ron", number(1.0)), ("roff", number(1e9))];
+                let model = self.switch_model(device, values, span);
+                let switched = self.namer.node(&format!("{name}_switched"));
+                let switch = Element::Switch { model, control, on: Some(start > 0.5) };
+                self.device(device, [supply, switched], switch, span, what);
+                let device = self.namer.device('R', name);
+                let load = Element::Resistor { value: number(1e3) };
+                self.device(device, [switched, ground], load, span, what);
+                let device = self.namer.device('E', name);
+                let law = self.voltage([switched, ground]).binary(Binary::Greater, number(0.5));
+                let element = Element::BehaviouralVoltage { law };
+                self.device(device, [node, ground], element, span, what);
+            }
+        }
+    }
+
+    /// The model card of a switch, named after it.
+    fn switch_model(&mut self, switch: Name, values: [(&str, Expr); 4], span: Span) -> Name {
+        let name = format!("{}_model", self.namer.names.text(switch));
+        let name = self.namer.names.intern(&name);
+        let parameters = values.map(|(key, value)| (key.to_string(), value)).to_vec();
+        let kind = CardKind::Model { name, kind: "sw".to_string(), parameters };
+        self.cards.push(Card { kind, span, comment: None });
+        name
     }
 
     /// The waveform of a signal in a source; exact jumps are noted.
@@ -177,6 +324,20 @@ impl Builder<'_> {
                 arguments.push(degrees);
                 (Shape::Sin, arguments)
             }
+            Waveform::Noise { seed, rms, dt } => {
+                let (seed, rms, dt) = (value(seed) as u64, value(rms), value(dt));
+                let until = experiment.until.unwrap_or(1.0);
+                let rise = rise.min(RISE * dt);
+                let mut arguments = vec![];
+                for k in 0..=(until / dt).floor() as u64 {
+                    let (begin, level) = (k as f64 * dt, rms * noise::normal(seed, k));
+                    let begin = if k > 0 { begin + rise } else { begin };
+                    let end = (k + 1) as f64 * dt;
+                    arguments.extend([begin, level, end, level].map(Expr::number));
+                }
+                jumps.steps = true;
+                (Shape::Pwl, arguments)
+            }
             Waveform::Pwl(points) => {
                 let mut arguments = Vec::with_capacity(2 * points.len());
                 for (index, (time, level)) in points.iter().enumerate() {
@@ -194,7 +355,7 @@ impl Builder<'_> {
                 (Shape::Pwl, arguments)
             }
         };
-        if jumps.rise || jumps.fall || !jumps.times.is_empty() {
+        if jumps.rise || jumps.fall || jumps.steps || !jumps.times.is_empty() {
             self.jumps.push(jumps);
         }
         let (shape, arguments) = function;
@@ -208,4 +369,11 @@ fn later(time: Expr, by: f64) -> Expr {
         Some(value) => Expr::number(value + by),
         None => time.binary(Binary::Add, Expr::number(by)),
     }
+}
+
+/// An expression of numbers alone as a number.
+fn folded(expr: Expr) -> Expr {
+    let mut constant = true;
+    expr.leaves(&mut |_, _| constant = false);
+    if constant { Expr::number(expr.evaluate(&mut |_| f64::NAN)) } else { expr }
 }

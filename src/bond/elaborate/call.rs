@@ -12,9 +12,6 @@ use crate::expr::{Expr as Tree, FUNCTIONS, Node};
 use crate::quantity::{did_you_mean, nearest};
 use crate::source::Span;
 
-/// What the language will have.
-const LATER: [&str; 5] = ["noise", "delay", "sample", "rate", "hysteresis"];
-
 impl Scope<'_> {
     /// What a call means.
     pub fn call(
@@ -79,14 +76,6 @@ impl Scope<'_> {
 
     fn unknown_call(&self, call: &Call) -> Diagnostic {
         let (name, span) = (call.name.text.as_str(), call.name.span);
-        if LATER.contains(&name) {
-            return Diagnostic::error(
-                "E0222",
-                span,
-                format!("`{name}(…)` is not part of the language yet"),
-            )
-            .says("cannot be used yet");
-        }
         let error = Diagnostic::error("E0210", span, format!("unknown function `{name}`"));
         if self.value(name).is_some() {
             return Diagnostic::error(

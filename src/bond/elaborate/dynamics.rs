@@ -175,6 +175,54 @@ pub(super) fn pwm(maker: &mut Maker<'_, '_>, mut given: Given) -> Option<SignalL
     Some(SignalLaw::Algebraic(law))
 }
 
+pub(super) fn delay(maker: &mut Maker<'_, '_>, mut given: Given) -> Option<SignalLaw> {
+    let (input, by) = (given.take()?, given.take()?);
+    // What is delayed is a signal: its past is remembered as it was, whatever it was made of.
+    let input = match &*input.node {
+        Node::Leaf(Leaf::Signal(_)) => input,
+        _ => maker.hidden("in", |_| SignalLaw::Algebraic(input)),
+    };
+    Some(SignalLaw::Memory { kind: Memory::Delay { by }, input })
+}
+
+pub(super) fn sample(_: &mut Maker<'_, '_>, mut given: Given) -> Option<SignalLaw> {
+    let (input, period) = (given.take()?, given.take()?);
+    Some(SignalLaw::Memory { kind: Memory::Sample { period }, input })
+}
+
+pub(super) fn hysteresis(maker: &mut Maker<'_, '_>, mut given: Given) -> Option<SignalLaw> {
+    let (input, low, high) = (given.take()?, given.take()?, given.take()?);
+    let mut value = |expr: &Expr| maker.scope.evaluate(expr, "a threshold", expr.span, maker.d);
+    if let (Some(below), Some(above)) = (value(&low), value(&high))
+        && below >= above
+    {
+        let message = "`low` of `hysteresis` is not below `high`";
+        maker.d.push(
+            Diagnostic::error("E0250", maker.span, message)
+                .says(format!("`low` is {below}, `high` {above}"))
+                .help("its form is `hysteresis(x, low, high)`; `compare(a, b)` has one threshold"),
+        );
+        return None;
+    }
+    Some(SignalLaw::Memory { kind: Memory::Hysteresis { low, high }, input })
+}
+
+/// What `tau` of `rate` is where nothing says: this part of the run, and for a run of unknown length this many seconds.
+const FOLLOWS: f64 = 1e-6;
+
+pub(super) fn rate(maker: &mut Maker<'_, '_>, mut given: Given) -> Option<SignalLaw> {
+    let (x, up, down) = (given.take()?, given.take()?, given.take()?);
+    let until = maker.scope.graph.experiment.until.unwrap_or(1.0);
+    let tau = given.take().unwrap_or(Tree::number(FOLLOWS * until));
+    let y = maker.this();
+    let z = maker.hidden("z", |z| SignalLaw::Integrator {
+        rate: (y - z) / tau.clone(),
+        initial: Initial::Implied,
+    });
+    let ahead = vec![x - z.clone(), -(tau.clone() * down), tau * up];
+    Some(SignalLaw::Algebraic(z + Tree::call(Function::Clamp, ahead)))
+}
+
 impl Scope<'_> {
     /// The law of a signal that is one call of a waveform or a function with memory.
     pub fn signal_call(
@@ -248,18 +296,22 @@ impl Scope<'_> {
         let place = match sort {
             Sort::Any | Sort::Above0 => place,
             Sort::Initial => Place::constant("an initial value"),
-            Sort::Constant | Sort::Size | Sort::Positive => Place::constant(what),
+            Sort::Constant | Sort::Size | Sort::Positive | Sort::Whole => Place::constant(what),
         };
         let lowered = self.lower(value, place, d)?;
         let least = match sort {
             Sort::Above0 if varies(&lowered) => None,
             Sort::Above0 | Sort::Positive => Some(("above 0", f64::MIN_POSITIVE)),
             Sort::Size => Some(("not below 0", 0.0)),
+            Sort::Whole => Some(("a whole number from 0 to 2^53", 0.0)),
             Sort::Any | Sort::Constant | Sort::Initial => None,
         };
+        const LARGEST: f64 = (1u64 << 53) as f64;
+        let broken =
+            |number: f64| sort == Sort::Whole && (number.fract() != 0.0 || number > LARGEST);
         if let Some((size, least)) = least
             && let Some(number) = self.evaluate(&lowered, what, value.span, d)
-            && number < least
+            && (number < least || broken(number))
         {
             d.push(
                 Diagnostic::error("E0250", value.span, format!("`{name}` must be {size}"))

@@ -11,8 +11,8 @@ use crate::quantity::Dimension;
 use crate::source::Span;
 
 impl Scope<'_> {
-    /// Reads `simulate`, `options` and `observe`, each as the command line overrides it.
-    pub fn set_experiment(&mut self, overrides: &Overrides, d: &mut Vec<Diagnostic>) {
+    /// Reads `simulate` and `options`, each as the command line overrides it.
+    pub fn set_run(&mut self, overrides: &Overrides, d: &mut Vec<Diagnostic>) {
         let simulate = std::mem::take(&mut self.simulate);
         if let [(.., first), (.., second), ..] = simulate.as_slice() {
             d.push(
@@ -39,7 +39,6 @@ impl Scope<'_> {
             self.options.iter().map(|(key, value)| (key.text.clone(), value.text.clone()));
         let options: Vec<_> = options.chain(overrides.options.iter().cloned()).collect();
         self.graph.experiment.options = options;
-        self.set_observed(overrides.observe.as_deref(), d);
     }
 
     /// A positive time in seconds.

@@ -12,6 +12,11 @@
 //! | `pi(x, Kp, Ki, lo, hi, Kaw, z0)` | u = Kp·x + z, y = clamp(u, lo, hi), z' = Ki·x + Kaw·(y − u), z(0) = z0 |
 //! | `pid(…, Kd, tau)` | the same with u = Kp·x + z + Kd·der(x, tau) |
 //! | `tf([b_m … b_0], [a_n … a_0], x)` | Y/X = (b_m·s^m + … + b_0)/(a_n·s^n + … + a_0), m ≤ n, all states 0 at first |
+//! | `delay(x, T)` | y(t) = x(t − T), x(0) before |
+//! | `sample(x, T)` | y(t) = x(k·T) for k·T ≤ t < (k + 1)·T, as x is just after k·T |
+//! | `rate(x, up, down, tau)` | z' = clamp((x − z)/tau, −down, up), z(0) = x(0), y = z + tau·z': y = x while x moves slowly enough; else y moves by `up` or `down` a second, up to up·tau (down·tau) ahead. Without `tau` a millionth of the run |
+//! | `hysteresis(x, low, high)` | 1 from when x rises above `high`, 0 from when it falls below `low`, 0 at first in between |
+//! | `noise(seed, rms, dt)` | normal random numbers of mean 0, each held for `dt`: see [`crate::bond::noise`] |
 //! | `compare(a, b)` | 1 where a > b, else 0 |
 //! | `pwm(duty, f)` | 1 while frac(f·t) < duty, else 0: duty against a saw tooth |
 
@@ -32,11 +37,13 @@ pub(super) enum Sort {
     Size,
     /// The same, above 0.
     Positive,
+    /// The same, a whole number from 0 to 2^53.
+    Whole,
     /// The same: an initial value.
     Initial,
 }
 
-use Sort::{Above0, Any, Constant, Initial, Positive, Size};
+use Sort::{Above0, Any, Constant, Initial, Positive, Size, Whole};
 
 /// How a call becomes what it means.
 #[derive(Clone, Copy)]
@@ -90,6 +97,7 @@ pub(super) const CALLS: &[Signature] = &[
     row("pulse", 7, Make::Waveform(pulse), &[("low", Constant), ("high", Constant), ("delay", Constant), ("rise", Size), ("fall", Size), ("width", Size), ("period", Size)]),
     row("sine", 3, Make::Waveform(sine), &[("offset", Constant), ("amplitude", Constant), ("frequency", Constant), ("delay", Constant), ("damping", Constant), ("phase", Constant)]),
     special("pwl", Make::Points, "pwl(t0, y0; t1, y1; …)"),
+    row("noise", 3, Make::Waveform(noise), &[("seed", Whole), ("rms", Size), ("dt", Positive)]),
     row("integ", 1, Make::Dynamic(dynamics::integ), &[("x", Any), ("ic", Initial)]),
     row("lag", 2, Make::Dynamic(dynamics::lag), &[("x", Any), ("tau", Above0), ("ic", Initial)]),
     row("leadlag", 3, Make::Dynamic(dynamics::leadlag), &[("x", Any), ("t_lead", Any), ("t_lag", Above0)]),
@@ -97,6 +105,10 @@ pub(super) const CALLS: &[Signature] = &[
     row("pi", 1, Make::Dynamic(dynamics::pi), &[("x", Any), ("Kp", Any), ("Ki", Any), ("lo", Any), ("hi", Any), ("Kaw", Any), ("z0", Initial)]),
     row("pid", 1, Make::Dynamic(dynamics::pid), &[("x", Any), ("Kp", Any), ("Ki", Any), ("Kd", Any), ("tau", Above0), ("lo", Any), ("hi", Any), ("Kaw", Any), ("z0", Initial)]),
     special("tf", Make::TransferFunction, "tf([b1, b0], [a1, a0], x)"),
+    row("delay", 2, Make::Dynamic(dynamics::delay), &[("x", Any), ("T", Positive)]),
+    row("sample", 2, Make::Dynamic(dynamics::sample), &[("x", Any), ("T", Positive)]),
+    row("rate", 3, Make::Dynamic(dynamics::rate), &[("x", Any), ("up", Above0), ("down", Above0), ("tau", Above0)]),
+    row("hysteresis", 3, Make::Dynamic(dynamics::hysteresis), &[("x", Any), ("low", Constant), ("high", Constant)]),
     row("pwm", 2, Make::Dynamic(dynamics::pwm), &[("duty", Any), ("f", Positive)]),
     row("compare", 2, Make::Formula(compare), &[("a", Any), ("b", Any)]),
     row("orifice", 3, Make::Formula(orifice), &[("e", Any), ("C", Any), ("Q0", Any)]),
@@ -180,6 +192,10 @@ fn sine(mut x: Given) -> Option<Waveform> {
         damping: x.or_zero(),
         phase: x.or_zero(),
     })
+}
+
+fn noise(mut x: Given) -> Option<Waveform> {
+    Some(Waveform::Noise { seed: x.take()?, rms: x.take()?, dt: x.take()? })
 }
 
 fn number(value: f64) -> Expr {

@@ -92,9 +92,10 @@ pub fn elaborate(
     let mut scope = scope::Scope::collect(program, map, &set, d);
     scope.join_bonds(d);
     scope.evaluate_parameters(d);
+    scope.set_run(overrides, d);
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
-    scope.set_experiment(overrides, d);
+    scope.set_observed(overrides.observe.as_deref(), d);
     if !has_errors(&d[before..]) {
         crate::bond::fields::check(&scope.graph, d);
     }

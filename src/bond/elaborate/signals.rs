@@ -319,6 +319,7 @@ impl Scope<'_> {
             match &mut signal.law {
                 SignalLaw::Algebraic(expr) => renumber(expr),
                 SignalLaw::Integrator { rate, .. } => renumber(rate),
+                SignalLaw::Memory { input, .. } => renumber(input),
                 SignalLaw::Waveform(_) => {}
             }
         }

@@ -193,6 +193,16 @@ fn algebraic(graph: &BondGraph, name: &str) -> String {
         SignalLaw::Waveform(Waveform::Step { at, before, after }) => {
             format!("step({}, {}, {})", spell(graph, at), spell(graph, before), spell(graph, after))
         }
+        SignalLaw::Memory { kind, input } => {
+            let kind = match kind {
+                Memory::Hysteresis { low, high } => {
+                    format!("hysteresis {} {}", spell(graph, low), spell(graph, high))
+                }
+                Memory::Sample { period } => format!("sample {}", spell(graph, period)),
+                Memory::Delay { by } => format!("delay {}", spell(graph, by)),
+            };
+            format!("{kind} of {}", spell(graph, input))
+        }
         SignalLaw::Waveform(other) => format!("{other:?}").split(' ').next().unwrap().to_string(),
     }
 }
@@ -397,6 +407,27 @@ fn signals_and_hidden_ones() {
     assert_eq!(signal(&graph, "c_step2").origin, SignalOrigin::Hidden);
     let columns: Vec<&str> = graph.experiment.observe.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(columns, ["u", "a", "b", "c", "c_step", "d", "g", "s", "w", "r", "f(m)"]);
+}
+
+#[test]
+fn memories() {
+    let graph = graph(&around(
+        "param T = 3 ms\nsignal a = sample(f(m), T)\nsignal b = delay(2*a, T) + 1\nsignal c = hysteresis(b, -1, T)\n\
+         signal g = rate(f(m), 2, 3, 1 ms)\nsignal h = noise(7, 0.1, T)\nsimulate until 2 s\nsignal r = rate(f(m), 1, 1)",
+    ));
+    for (name, law) in [
+        ("a", "sample T of f(U -> m)"),
+        ("b_delay_in", "(2*a)"),
+        ("b_delay", "delay T of b_delay_in"),
+        ("b", "(b_delay+1)"),
+        ("c", "hysteresis -1 T of b"),
+        ("g_z", "integ(((g-g_z)/0.001), implied)"),
+        ("g", "(g_z+clamp((f(U -> m)-g_z),(-(0.001*3)),(0.001*2)))"),
+        ("h", "Noise"),
+        ("r_z", "integ(((r-r_z)/0.000002), implied)"),
+    ] {
+        assert_eq!(algebraic(&graph, name), law, "{name}");
+    }
 }
 
 #[test]
@@ -743,8 +774,18 @@ fn readings() {
 
 #[test]
 fn functions_and_signals() {
-    errors(&around("signal x = sample(0.5, 1)"), &["E0222 sample"]);
     for (call, at) in [
+        ("sample(f(m), 0)", "0"),
+        ("delay(f(m), -1 ms)", "-1 ms"),
+        ("delay(f(m), 0)", "0"),
+        ("rate(f(m), 0, 1)", "0"),
+        ("rate(f(m), 1, -1)", "-1"),
+        ("hysteresis(f(m), 2, 1)", "hysteresis(f(m), 2, 1)"),
+        ("hysteresis(f(m), 1, 1)", "hysteresis(f(m), 1, 1)"),
+        ("noise(1.5, 1, 1 ms)", "1.5"),
+        ("noise(-1, 1, 1 ms)", "-1"),
+        ("noise(1, -1, 1 ms)", "-1"),
+        ("noise(1, 1, 0)", "0"),
         ("pwm(0.5, 0)", "0"),
         ("pwm(0.5, -2*1)", "-2*1"),
         ("lag(f(m), 0)", "0"),

@@ -11,16 +11,19 @@
 
 pub mod known;
 pub mod compiled;
+pub mod memory;
 pub mod waveform;
 
 use super::graph::{
-    BondGraph, BondId, Dissipation, End, Expr, Law, Leaf, Modulus, Power, SignalId, SignalLaw,
-    Storage, StoreLaw, Variable, VertexId,
+    self, BondGraph, BondId, Dissipation, End, Expr, Law, Leaf, Modulus, Power, SignalId,
+    SignalLaw, Storage, StoreLaw, Variable, VertexId,
 };
 use crate::expr::{self, Binary, Function, Node};
+use crate::source::Span;
 pub use compiled::Compiled;
 pub use known::Known;
 use known::{held_corners, over_time_alone, resolve};
+use memory::{Kind, Memory, Remembered};
 pub use waveform::Wave;
 
 /// An unknown; states come first.
@@ -56,10 +59,36 @@ pub enum Input {
     Time,
     /// A function of time with corners, by its index in [`Equations::waves`].
     Wave(u32),
+    /// The value of a condition that follows from the unknowns, by its index in [`Equations::conditions`].
+    Condition(u32),
 }
 
 /// An equation's right-hand side or residual.
 pub type Formula = expr::Expr<Input>;
+
+/// An operation whose value jumps where a − b changes its sign, or `floor(a)` its value.
+#[derive(Clone, Debug)]
+pub struct Condition {
+    /// What it asks.
+    pub question: Question,
+    /// The values that it compares; b is 0 where there is one only.
+    pub a: Formula,
+    /// The other one.
+    pub b: Formula,
+    /// The element or signal in whose law it stands.
+    pub span: Span,
+}
+
+/// What a condition asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// `a < b` and the like: 1 or 0.
+    Compare(Binary),
+    /// The sign of a.
+    Sign,
+    /// The largest whole number that is not above a.
+    Floor,
+}
 
 /// The equations of a graph.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +107,10 @@ pub struct Equations {
     pub origins: Vec<Origin>,
     /// Functions of time.
     pub waves: Vec<Known>,
+    /// What jumps with the unknowns.
+    pub conditions: Vec<Condition>,
+    /// Memories, by the round in which they take their values.
+    pub memories: Vec<Remembered>,
     /// First index of the bonds' efforts; flows alternate with them.
     first_bond: usize,
     /// By signal: its unknown or its wave.
@@ -87,6 +120,9 @@ pub struct Equations {
     /// By vertex: the unknown of its state in rate form.
     rated: Vec<Option<u32>>,
 }
+
+/// Beyond so many corners echoes of delays are no longer landed on.
+const MOST_ECHOES: usize = 20_000;
 
 /// The equations of a graph, from the definitions of its elements.
 pub fn equations(graph: &BondGraph) -> Equations {
@@ -114,9 +150,10 @@ pub fn equations(graph: &BondGraph) -> Equations {
                     all.rates[k as usize] = rate;
                 }
             }
-            SignalLaw::Waveform(_) => {}
+            SignalLaw::Waveform(_) | SignalLaw::Memory { .. } => {}
         }
     }
+    all.remember(graph);
     all
 }
 
@@ -186,7 +223,7 @@ impl Equations {
                     self.waves.push(Known::Wave(resolve(graph, waveform)));
                     Some(Input::Wave(self.waves.len() as u32 - 1))
                 }
-                SignalLaw::Algebraic(_) => None,
+                SignalLaw::Algebraic(_) | SignalLaw::Memory { .. } => None,
             };
         }
         self.states = self.unknowns.len();
@@ -195,11 +232,69 @@ impl Equations {
             self.unknowns.extend([Unknown::Effort(id), Unknown::Flow(id)]);
         }
         for (i, signal) in graph.signals.iter().enumerate() {
-            if matches!(signal.law, SignalLaw::Algebraic(_)) {
+            if matches!(signal.law, SignalLaw::Algebraic(_) | SignalLaw::Memory { .. }) {
                 self.signals[i] = Some(Input::Unknown(self.unknowns.len() as u32));
                 self.unknowns.push(Unknown::Signal(SignalId(i as u32)));
             }
         }
+    }
+
+    /// Memories are unknowns that equal what is remembered, so that what others delay of them is their past too.
+    fn remember(&mut self, graph: &BondGraph) {
+        let rounds = crate::bond::memory::rounds(graph);
+        for (i, signal) in graph.signals.iter().enumerate() {
+            let SignalLaw::Memory { kind, input } = &signal.law else { continue };
+            let number = |expr: &Expr| {
+                expr.evaluate(&mut |leaf| match leaf {
+                    Leaf::Parameter(id) => graph.parameters[id.index()].value,
+                    _ => f64::NAN,
+                })
+            };
+            let input = self.lower(graph, input, None);
+            let (kind, memory) = match kind {
+                graph::Memory::Hysteresis { low, high } => {
+                    let kind = Kind::Hysteresis { low: number(low), high: number(high) };
+                    (kind, Memory::held())
+                }
+                graph::Memory::Sample { period } => {
+                    (Kind::Sample { period: number(period) }, Memory::held())
+                }
+                graph::Memory::Delay { by } => {
+                    let by = number(by);
+                    (Kind::Delay { by }, Memory::delayed(by, &input, &self.waves))
+                }
+            };
+            let wave = self.waves.len();
+            self.waves.push(Known::Memory(memory));
+            // Above `high` while it is 0, above `low` while it is 1.
+            let condition = match kind {
+                Kind::Hysteresis { low, high } => {
+                    let held = Formula::leaf(Input::Wave(wave as u32));
+                    let b = Formula::number(high) - Formula::number(high - low) * held;
+                    let question = Question::Compare(Binary::Greater);
+                    let condition = Condition { question, a: input.clone(), b, span: signal.span };
+                    self.conditions.push(condition);
+                    Some(self.conditions.len() - 1)
+                }
+                Kind::Sample { .. } | Kind::Delay { .. } => None,
+            };
+            let own = self.leaf(self.signals[i]);
+            let origin = Origin::Signal(SignalId(i as u32));
+            self.row(origin, own, Formula::leaf(Input::Wave(wave as u32)));
+            let unknown = match self.signals[i] {
+                Some(Input::Unknown(k)) => k as usize,
+                _ => continue,
+            };
+            self.memories.push(Remembered {
+                wave,
+                unknown,
+                kind,
+                input,
+                condition,
+                round: rounds[i],
+            });
+        }
+        self.memories.sort_by_key(|memory| memory.round);
     }
 
     fn state(&mut self, unknown: Unknown, origin: Origin) -> u32 {
@@ -352,6 +447,20 @@ impl Equations {
             return held;
         }
         let node = match &*expr.node {
+            Node::Binary(op, a, b) if op.is_comparison() => {
+                let (a, b) = (self.lower(graph, a, own), self.lower(graph, b, own));
+                return self.condition(Question::Compare(*op), a, b, expr.span);
+            }
+            Node::Call(function @ (Function::Floor | Function::Sign), arguments)
+                if arguments.len() == 1 =>
+            {
+                let a = self.lower(graph, &arguments[0], own);
+                let question = match function {
+                    Function::Sign => Question::Sign,
+                    _ => Question::Floor,
+                };
+                return self.condition(question, a, Formula::number(0.0), expr.span);
+            }
             Node::Leaf(leaf) => return self.lower_leaf(graph, leaf, own),
             Node::Number(value) => Node::Number(*value),
             Node::Unary(op, a) => Node::Unary(*op, self.lower(graph, a, own)),
@@ -359,9 +468,7 @@ impl Equations {
                 Node::Binary(*op, self.lower(graph, a, own), self.lower(graph, b, own))
             }
             // x − y·floor(x/y), so that its jumps are found as those of the floor.
-            Node::Call(Function::Mod, arguments)
-                if over_time_alone(expr) && arguments.len() == 2 =>
-            {
+            Node::Call(Function::Mod, arguments) if arguments.len() == 2 => {
                 let (x, y) = (&arguments[0], &arguments[1]);
                 let quotient = x.clone().binary(Binary::Divide, y.clone());
                 let turns =
@@ -421,16 +528,62 @@ impl Equations {
         Some(Formula::leaf(Input::Wave(self.waves.len() as u32 - 1)))
     }
 
+    /// The value of a condition; that of numbers is a number.
+    fn condition(&mut self, question: Question, a: Formula, b: Formula, span: Span) -> Formula {
+        if let (Some(a), Some(b)) = (a.constant(), b.constant()) {
+            return Formula::number(question.value(a, b));
+        }
+        self.conditions.push(Condition { question, a, b, span });
+        Formula::leaf(Input::Condition(self.conditions.len() as u32 - 1))
+    }
+
     /// Sorted times of 0, every corner and `until`.
     pub fn corners(&self, until: f64) -> Vec<f64> {
         let mut corners = vec![];
         for known in &self.waves {
             match known {
                 Known::Wave(wave) => wave.corners(until, &mut corners),
+                Known::Memory(_) => {}
                 Known::Held(formula) => held_corners(formula, until, &mut corners),
             }
         }
-        waveform::merge_corners(corners, until)
+        let mut delays = vec![];
+        for memory in &self.memories {
+            match memory.kind {
+                Kind::Sample { period } => {
+                    waveform::instants(period, until, &mut |t| corners.push(t));
+                }
+                Kind::Delay { by } => delays.push(by),
+                Kind::Hysteresis { .. } => {}
+            }
+        }
+        let mut corners = waveform::merge_corners(corners, until);
+        // What has a corner has one again when a delay is over, and again after the next.
+        let mut fresh = corners.clone();
+        while !fresh.is_empty() && !delays.is_empty() && corners.len() < MOST_ECHOES {
+            let near = 1e-12 * until;
+            let is_new = |t: &f64| {
+                let next = corners.partition_point(|corner| *corner < t - near);
+                *t < until && corners.get(next).is_none_or(|corner| *corner > t + near)
+            };
+            let echoes = fresh.iter().flat_map(|t| delays.iter().map(move |by| t + by));
+            let echoes: Vec<f64> = echoes.filter(is_new).collect();
+            corners =
+                waveform::merge_corners(corners.into_iter().chain(echoes.clone()).collect(), until);
+            fresh = echoes;
+        }
+        corners
+    }
+}
+
+impl Question {
+    /// What it has for an answer at (a, b).
+    pub fn value(self, a: f64, b: f64) -> f64 {
+        match self {
+            Question::Compare(op) => op.value(a, b),
+            Question::Sign => crate::expr::values::sign(a),
+            Question::Floor => a.floor(),
+        }
     }
 }
 
@@ -440,10 +593,8 @@ pub fn every_expression<'a>(graph: &'a BondGraph, visit: &mut dyn FnMut(&'a Expr
         vertex.law.expressions(visit);
     }
     for signal in &graph.signals {
-        match &signal.law {
-            SignalLaw::Algebraic(value) => visit(value),
-            SignalLaw::Integrator { rate, .. } => visit(rate),
-            SignalLaw::Waveform(_) => {}
+        if let Some(expr) = signal.law.expression() {
+            visit(expr);
         }
     }
     for observation in &graph.experiment.observe {

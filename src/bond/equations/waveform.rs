@@ -4,6 +4,7 @@
 //! smooth piece; the piece is chosen by a time strictly `inside` the segment and may then be evaluated at either end
 //! of it, so that neither the value before a jump nor the one after it depends on how a corner was rounded.
 
+use crate::bond::noise;
 use std::f64::consts::TAU;
 
 /// Periods of a pulse train whose corners are listed; a run with more would not end anyway.
@@ -18,6 +19,7 @@ pub enum Wave {
     Pulse { low: f64, high: f64, delay: f64, rise: f64, fall: f64, width: f64, period: f64 },
     Sine { offset: f64, amplitude: f64, frequency: f64, delay: f64, damping: f64, phase: f64 },
     Pwl(Vec<(f64, f64)>),
+    Noise { seed: u64, rms: f64, dt: f64 },
 }
 
 impl Wave {
@@ -60,6 +62,9 @@ impl Wave {
                 let u = if inside < *delay { 0.0 } else { t - delay };
                 offset + amplitude * (-u * damping).exp() * (TAU * frequency * u + phase).sin()
             }
+            Wave::Noise { seed, rms, dt } => {
+                rms * noise::normal(*seed, (inside / dt).floor().max(0.0) as u64)
+            }
             Wave::Pwl(points) => {
                 let next = points.partition_point(|(at, _)| *at <= inside);
                 match (next.checked_sub(1).map(|i| points[i]), points.get(next).copied()) {
@@ -82,6 +87,7 @@ impl Wave {
             Wave::Step { at, .. } | Wave::Ramp { at, .. } => push(*at),
             Wave::Sine { delay, .. } => push(*delay),
             Wave::Pwl(points) => points.iter().for_each(|(at, _)| push(*at)),
+            Wave::Noise { dt, .. } => instants(*dt, until, &mut push),
             Wave::Pulse { delay, rise, fall, width, period, .. } => {
                 for turn in 0..MOST_TURNS {
                     let begin = delay + f64::from(turn) * period;
@@ -100,6 +106,17 @@ impl Wave {
                 }
             }
         }
+    }
+}
+
+/// Every multiple of a period within (0, until).
+pub fn instants(period: f64, until: f64, push: &mut dyn FnMut(f64)) {
+    for turn in 1..=MOST_TURNS {
+        let t = f64::from(turn) * period;
+        if t >= until {
+            break;
+        }
+        push(t);
     }
 }
 

@@ -17,6 +17,8 @@ pub mod ccvs;
 pub mod behavioural_voltage;
 pub mod behavioural_current;
 pub mod switch;
+pub mod line;
+pub mod hold;
 pub mod diode;
 
 use super::stamper::{Current, Stamper};
@@ -43,12 +45,14 @@ pub struct Needs {
     pub internal: bool,
     pub charge: bool,
     pub mode: bool,
+    /// A second branch.
+    pub second: bool,
 }
 
 impl Needs {
     /// Nothing.
     pub const NOTHING: Needs =
-        Needs { branch: Branch::Never, internal: false, charge: false, mode: false };
+        Needs { branch: Branch::Never, internal: false, charge: false, mode: false, second: false };
     /// A branch.
     pub const BRANCH: Needs = Needs { branch: Branch::Always, ..Needs::NOTHING };
 }
@@ -85,6 +89,8 @@ pub const DEVICES: &[Row] = &[
     behavioural_voltage::ROW,
     behavioural_current::ROW,
     switch::ROW,
+    line::ROW,
+    hold::ROW,
     diode::ROW,
 ];
 
@@ -104,6 +110,8 @@ pub fn row(kind: &DeviceKind) -> &'static Row {
         DeviceKind::BehaviouralVoltage { .. } => &behavioural_voltage::ROW,
         DeviceKind::BehaviouralCurrent { .. } => &behavioural_current::ROW,
         DeviceKind::Switch { .. } => &switch::ROW,
+        DeviceKind::Line { .. } => &line::ROW,
+        DeviceKind::Hold { .. } => &hold::ROW,
         DeviceKind::Diode { .. } => &diode::ROW,
     }
 }

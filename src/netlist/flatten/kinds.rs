@@ -16,7 +16,8 @@ pub fn resolve(flat: &Flat, header: &Header, times: Times, d: &mut Vec<Diagnosti
     flat.devices
         .iter()
         .map(|pending| {
-            let kind = kind(&lookup, pending, header, times, d);
+            let kind =
+                sampled(flat, pending, header).or_else(|| kind(&lookup, pending, header, times, d));
             Device {
                 name: flat.device_name(pending),
                 nodes: pending.nodes.clone(),
@@ -26,6 +27,24 @@ pub fn resolve(flat: &Flat, header: &Header, times: Times, d: &mut Vec<Diagnosti
             }
         })
         .collect()
+}
+
+/// What a device of an exact sample is; `None` for all others.
+fn sampled(flat: &Flat, pending: &Pending, header: &Header) -> Option<DeviceKind> {
+    if header.samples.is_empty() {
+        return None;
+    }
+    let name = flat.device_name(pending);
+    let is = |other: &str| other.eq_ignore_ascii_case(&name);
+    header.samples.iter().find_map(|sample| {
+        let nothing = circuit::Waveform::Constant(0.0);
+        match (is(&sample.switch), is(&sample.capacitor), is(&sample.clock)) {
+            (true, ..) => Some(DeviceKind::Hold { period: sample.period, round: sample.round }),
+            (_, true, _) => Some(DeviceKind::CurrentSource { waveform: nothing }),
+            (.., true) => Some(DeviceKind::VoltageSource { waveform: nothing }),
+            _ => None,
+        }
+    })
 }
 
 fn kind(
@@ -81,6 +100,20 @@ fn kind(
         Element::Ccvs { gain, control } => {
             let (gain, control) = (number(gain, d), lookup.device(scope, *control, span, d));
             DeviceKind::Ccvs { gain: gain?, control: control? }
+        }
+        Element::Line { impedance, delay, initial } => {
+            let values = match initial {
+                Some(values) => {
+                    let mut numbers = [0.0; 4];
+                    for (number_of, value) in numbers.iter_mut().zip(values) {
+                        *number_of = number(value, d)?;
+                    }
+                    Some(numbers)
+                }
+                None => None,
+            };
+            let (impedance, delay) = (number(impedance, d), number(delay, d));
+            DeviceKind::Line { impedance: impedance?, delay: delay?, initial: values }
         }
         Element::BehaviouralVoltage { law } => {
             DeviceKind::BehaviouralVoltage { law: lookup.law(scope, law, d)? }

@@ -124,6 +124,11 @@ pub fn waveform(
 fn points(values: &[f64], jumps: Option<&Jumps>) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> =
         values.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
+    if jumps.is_some_and(|jumps| jumps.steps) {
+        for k in (2..points.len()).step_by(2) {
+            points[k].0 = points[k - 1].0;
+        }
+    }
     for time in jumps.iter().flat_map(|jumps| &jumps.times) {
         let same = |t: f64| t == *time || (t - time).abs() <= 1e-12 * time.abs();
         // The last point at that time begins the segment.

@@ -33,6 +33,7 @@ pub const LETTERS: &[Letter] = &[
     Letter { letter: b'B', nodes: 2, form: "Bname n+ n- V=expression, or I=expression", read: behavioural },
     Letter { letter: b'S', nodes: 2, form: "Sname n+ n- c+ c- model [ON | OFF]", read: switch },
     Letter { letter: b'W', nodes: 2, form: "Wname n+ n- device model [ON | OFF]", read: current_switch },
+    Letter { letter: b'T', nodes: 2, form: "Tname a+ a- b+ b- Z0=ohms TD=seconds, or F=hertz [NL=lengths]; [IC=v1,i1,v2,i2]", read: line },
     Letter { letter: b'D', nodes: 2, form: "Dname anode cathode model [area]", read: diode },
     Letter { letter: b'X', nodes: 0, form: "Xname nodes … subcircuit [parameter=value …]", read: instance },
 ];
@@ -42,7 +43,7 @@ pub const LETTERS: &[Letter] = &[
 pub const OTHER_LETTERS: &[(u8, &str)] = &[
     (b'A', "an XSPICE code model"), (b'J', "a junction field-effect transistor"), (b'M', "a MOS transistor"),
     (b'N', "a Verilog-A device"), (b'O', "a lossy transmission line"), (b'P', "a coupled transmission line"),
-    (b'Q', "a bipolar transistor"), (b'T', "a transmission line"), (b'U', "an RC line or a digital device"),
+    (b'Q', "a bipolar transistor"), (b'U', "an RC line or a digital device"),
     (b'Y', "a lossy transmission line"), (b'Z', "a MESFET"),
 ];
 
@@ -65,7 +66,7 @@ pub fn device(reader: &mut Reader, cursor: &mut Cursor) -> Option<Device> {
                 format!("`{name}` is {what}, which is not read yet"),
             )
             .because("a card's first letter says what it is")
-            .help("devices that are read: R L C K V I E F G H B S W D X"),
+            .help("devices that are read: R L C K V I E F G H B S W T D X"),
             None if first == b'+' => {
                 Diagnostic::error("E0701", span, "there is no line to continue")
             }
@@ -334,6 +335,50 @@ fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option
 fn current_switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
     let control = control(reader, cursor)?;
     Some(Element::CurrentSwitch { model: model(reader, cursor)?, control, on: state(cursor) })
+}
+
+/// Z0 and TD, or F and NL (a quarter of a wave where it is left out): TD = NL/F.
+fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {
+    for what in ["the third node", "the fourth node"] {
+        nodes.push(reader.node(cursor, what)?);
+    }
+    let (mut impedance, mut delay, mut frequency, mut lengths) = (None, None, None, None);
+    let mut initial = None;
+    while !cursor.is_done() {
+        let span = cursor.here(reader);
+        let Some((word, _)) = cursor.key() else { break };
+        match word.to_ascii_lowercase().as_str() {
+            "z0" | "zo" => impedance = Some(reader.value(cursor, "the impedance")?),
+            "td" => delay = Some(reader.value(cursor, "the delay")?),
+            "f" => frequency = Some(reader.value(cursor, "the frequency")?),
+            "nl" => lengths = Some(reader.value(cursor, "the length in wavelengths")?),
+            "ic" => {
+                let mut values = vec![];
+                for _ in 0..4 {
+                    cursor.loose();
+                    values.push(reader.value(cursor, "an initial value")?);
+                }
+                initial = <[Expr; 4]>::try_from(values).ok();
+                cursor.loose();
+            }
+            other => {
+                let message = format!("`{other}=` of a line is not read");
+                reader.diagnostics.push(Diagnostic::error("E0704", span, message));
+                return None;
+            }
+        }
+    }
+    if impedance.is_none() {
+        reader.missing(cursor, "the impedance `Z0=`");
+    }
+    let by_length = frequency.map(|f| {
+        let lengths = lengths.unwrap_or(Expr::number(0.25));
+        lengths.binary(crate::expr::Binary::Divide, f)
+    });
+    if delay.is_none() && by_length.is_none() {
+        reader.missing(cursor, "the delay `TD=`, or `F=`");
+    }
+    Some(Element::Line { impedance: impedance?, delay: delay.or(by_length)?, initial })
 }
 
 fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {

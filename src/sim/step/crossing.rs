@@ -81,7 +81,7 @@ impl Run<'_> {
         while let Some(first) = self.first_crossing() {
             let Crossed { mode, root, .. } = self.crossed[first];
             let ramped = self.network.hold(mode) == RAMPED;
-            if ramped || self.is_switch(mode) || self.jumps(mode, root) {
+            if ramped || self.is_switch(mode) || self.jumps(mode, root, true) {
                 if self.network.hold(mode) == FREE {
                     self.network.set_hold(mode, HELD);
                     self.work.linearised = false;
@@ -207,7 +207,11 @@ impl Run<'_> {
         }
         if past.abs() <= tolerance || search.tries >= 3 || h <= self.smallest {
             // Still before the threshold: keep the step, the crossing is in the next one.
-            return if past < -tolerance { Located::Nothing } else { Located::Here(mode) };
+            if past < -tolerance {
+                return Located::Nothing;
+            }
+            self.see_middle(mode);
+            return Located::Here(mode);
         }
         if past > 0.0 {
             search.after = (h, past);
@@ -230,8 +234,18 @@ impl Run<'_> {
         Located::Redo(guess.max(self.smallest))
     }
 
-    /// Whether any law or guard jumps when this condition changes at a part of the step.
-    fn jumps(&mut self, mode: usize, theta: f64) -> bool {
+    /// How far a guard has been away from its threshold in the middle of a step that ends there.
+    fn see_middle(&mut self, mode: usize) {
+        let Run { network, state, next, controls, work, .. } = self;
+        work.dense.unknowns(0.5, state, next, &mut work.x);
+        network.controls(&work.x, 0.5 * (state.t + next.t), &mut controls.inside);
+        let (a, b) = events::pair(&controls.inside, mode);
+        network.tracks[mode].see(a, b);
+    }
+
+    /// Whether any law or guard jumps when this condition changes at a part of the step. The end of a step that error
+    /// control has refused says nothing of how large laws are.
+    fn jumps(&mut self, mode: usize, theta: f64, accepted: bool) -> bool {
         let Run { network, state, next, controls, work, settings, .. } = self;
         let h = next.t - state.t;
         let hold = network.hold(mode);
@@ -272,7 +286,9 @@ impl Run<'_> {
         // The magnitudes that laws have at both ends, then the crossing itself; where a law has no value there, the
         // crossing from both sides.
         let near = 1e-9;
-        compare(0.0, 1.0, f64::INFINITY, false);
+        if accepted {
+            compare(0.0, 1.0, f64::INFINITY, false);
+        }
         let jump = compare(theta, theta, settings.reltol, true)
             .or_else(|| compare((theta - near).max(0.0), (theta + near).min(1.0), COARSE, false));
         network.set_hold(mode, hold);
@@ -306,7 +322,7 @@ impl Run<'_> {
                 continue;
             }
             let theta = if before < 0.0 { before / (before - after) } else { 0.0 };
-            if self.jumps(mode, theta) {
+            if self.jumps(mode, theta, false) {
                 self.network.set_hold(mode, HELD);
                 any = true;
             }
@@ -360,6 +376,7 @@ impl Run<'_> {
             self.say_slide(&Slide { mode, width });
         }
         self.restart(Moment::Restart)?;
+        self.settle_memories(Moment::Restart)?;
         self.shorten();
         self.row_here()
     }

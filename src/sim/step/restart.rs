@@ -1,6 +1,6 @@
 //! Restarts of a run: consistent values at its start, after corners and after events.
 
-use super::{Run, count_system};
+use super::{Run, count_system, past};
 use crate::circuit::Waveform;
 use crate::sim::explain::{Failure, Moment, failure};
 use crate::sim::methods::{self, Method};
@@ -38,19 +38,15 @@ impl Run<'_> {
             let scratch = &mut self.work.scratch;
             let mut slides = vec![];
             let (state, floors) = (&mut self.state, &self.floors);
-            op::operating_point(network, state, floors, &mut slides, scratch).map_err(
-                |trouble| {
-                    failure(
-                        network.system,
-                        Moment::OperatingPoint,
-                        0.0,
-                        &trouble,
-                        &network.statistics,
-                    )
-                },
-            )?;
+            past::at_rest(network, state, |network, state| {
+                op::operating_point(network, state, floors, &mut slides, scratch)
+            })
+            .map_err(|trouble| {
+                failure(network.system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
+            })?;
         }
         self.restart(Moment::Start)?;
+        self.settle_memories(Moment::Start)?;
         let (method, reason) = methods::choose(&self.network, self.index2);
         let (method, reason) = match self.settings.method {
             Method::Auto => (method, reason),
@@ -220,6 +216,7 @@ impl Run<'_> {
         let events = self.network.statistics.events;
         let before = self.rows.is_some().then(|| self.state.x.clone());
         self.restart(Moment::Restart)?;
+        self.settle_memories(Moment::Restart)?;
         self.shorten();
         // A second row only where something jumped.
         let jumped = before.is_some_and(|before| {

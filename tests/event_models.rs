@@ -1,0 +1,255 @@
+//! The shipped models with events, on both routes, against exact piecewise solutions and references.
+
+use bondspice::bond::causality;
+use bondspice::bond::elaborate::{Overrides, elaborate};
+use bondspice::bond::syntax::parse;
+use bondspice::cli::pipeline::{self, run_text};
+use bondspice::second;
+use bondspice::sim::{Interval, Statistics};
+use bondspice::source::SourceMap;
+use bondspice::trace::{Trace, csv};
+
+fn file(path: &str) -> String {
+    let path = format!("{}/{path}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// A shipped model by the circuit, on its own grid, at default options.
+#[track_caller]
+fn circuit(model: &str) -> (Trace, Statistics) {
+    let text = file(&format!("models/{model}.bg"));
+    let run = run_text(&format!("{model}.bg"), &text, &Overrides::default());
+    let (trace, statistics) = run.unwrap_or_else(|d| panic!("{model}: {d:#?}"));
+    println!("{model}:\n{statistics}");
+    (trace, statistics)
+}
+
+/// The same by its own equations.
+#[track_caller]
+fn own_equations(model: &str, times: &[f64]) -> (Trace, second::radau::Statistics) {
+    let mut map = SourceMap::default();
+    let id = map.add(&format!("{model}.bg"), file(&format!("models/{model}.bg")));
+    let mut d = vec![];
+    let text = parse(&map, id, &mut d);
+    let graph = elaborate(&text.into(), &map, &Overrides::default(), &mut d).unwrap();
+    let causality = causality::assign(&graph, &mut d).unwrap();
+    let settings = second::Settings::default();
+    let run = second::integrate(&graph, &causality, times, &settings, &mut d);
+    let run = run.unwrap_or_else(|| panic!("{model}: {d:#?}"));
+    let residual = run.energy.residual.abs() / run.energy.turnover;
+    println!("{model}: {:?}, energy off by {residual:.1e}", run.statistics);
+    assert!(residual < 1e-6, "{model}: {residual:e}");
+    let mut trace = Trace::new(run.names, vec![]);
+    trace.columns = run.columns;
+    (trace, run.statistics)
+}
+
+/// The times with two rows in a run that follows its steps.
+fn jumps(model: &str) -> Vec<f64> {
+    let mut map = SourceMap::default();
+    let id = map.add(&format!("{model}.bg"), file(&format!("models/{model}.bg")));
+    let mut d = vec![];
+    let mut run = pipeline::prepare(&mut map, id, &Overrides::default(), None, &mut d).unwrap();
+    run.settings.as_mut().unwrap().rows = Interval::Steps;
+    let mut trace = run.trace();
+    run.go(&mut trace).unwrap();
+    let pairs = trace.time().windows(2).filter(|pair| pair[0] == pair[1]);
+    let mut times: Vec<f64> = pairs.map(|pair| pair[0]).collect();
+    times.dedup();
+    times
+}
+
+/// The largest difference from exact values, in parts of their range.
+#[track_caller]
+fn worst(trace: &Trace, name: &str, exact: &[f64]) -> f64 {
+    let ours = trace.column(name).unwrap_or_else(|| panic!("no {name} in {:?}", trace.names));
+    assert_eq!(ours.len(), exact.len(), "{name}");
+    let (low, high) = exact.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let mut worst = (0.0, 0.0);
+    for ((a, b), t) in ours.iter().zip(exact).zip(trace.time()) {
+        let error = (a - b).abs() / (high - low);
+        if error > worst.0 || error.is_nan() {
+            worst = (error, *t);
+        }
+    }
+    println!("{name}: {:.1e} of range at {} s", worst.0, worst.1);
+    worst.0
+}
+
+type Matrix = [[f64; 3]; 3];
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+/// e^A by scaling and a Taylor series.
+fn exponential(a: &Matrix) -> Matrix {
+    const HALVINGS: i32 = 12;
+    let scaled: Matrix = a.map(|row| row.map(|v| v * 0.5f64.powi(HALVINGS)));
+    let one: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    let (mut sum, mut term) = (one, one);
+    for k in 1..12 {
+        term = product(&term, &scaled).map(|row| row.map(|v| v / f64::from(k)));
+        for i in 0..3 {
+            for j in 0..3 {
+                sum[i][j] += term[i][j];
+            }
+        }
+    }
+    for _ in 0..HALVINGS {
+        sum = product(&sum, &sum);
+    }
+    sum
+}
+
+#[test]
+fn the_buck_converter_moves_as_matrix_exponentials_say() {
+    let (vin, fs, duty) = (24.0, 20e3, 0.4);
+    let (l, rl, c, resr, rload): (f64, f64, f64, f64, f64) = (1e-4, 0.05, 47e-6, 0.02, 3.0);
+    // State (i, vc, 1); vo = (vc + Resr·i)/(1 + Resr/Rload).
+    let share = 1.0 / (1.0 + resr / rload);
+    let matrix = |on: bool, t: f64| -> Matrix {
+        let d = if on { 1.0 } else { 0.0 };
+        let rows = [
+            [-(rl + resr * share) / l, -share / l, d * vin / l],
+            [(1.0 - resr * share / rload) / c, -share / rload / c, 0.0],
+            [0.0; 3],
+        ];
+        rows.map(|row| row.map(|v| v * t))
+    };
+    let move_on = |state: [f64; 3], on: bool, t: f64| -> [f64; 3] {
+        let e = exponential(&matrix(on, t));
+        std::array::from_fn(|i| (0..3).map(|k| e[i][k] * state[k]).sum())
+    };
+    let (trace, statistics) = circuit("buck_pwm");
+    let times = trace.time().to_vec();
+    let (mut i, mut vc, mut vo) = (vec![], vec![], vec![]);
+    // The state at the beginning of each period, then within it.
+    let (mut begin, mut period) = ([0.0, 0.0, 1.0], 0);
+    for t in &times {
+        while (f64::from(period) + 1.0) / fs <= t + 1e-15 {
+            begin = move_on(begin, true, duty / fs);
+            begin = move_on(begin, false, (1.0 - duty) / fs);
+            period += 1;
+        }
+        let since = t - f64::from(period) / fs;
+        let on = since.min(duty / fs);
+        let state = move_on(move_on(begin, true, on), false, since - on);
+        i.push(state[0]);
+        vc.push(state[1]);
+        vo.push(share * (state[1] + resr * state[0]));
+    }
+    let (own, own_statistics) = own_equations("buck_pwm", &times);
+    for (name, exact) in [("i", &i), ("vc", &vc), ("vo", &vo)] {
+        assert!(worst(&trace, name, exact) <= 1e-6, "{name}: {statistics}");
+        assert!(worst(&own, name, exact) <= 1e-8, "{name}: {own_statistics:?}");
+    }
+    // 40 periods: each turns over its clock and falls at its duty.
+    assert_eq!((statistics.rejected.total(), statistics.slides), (0, 0), "{statistics}");
+    let expected: Vec<f64> =
+        (0..40).flat_map(|k| [f64::from(k) / fs, (f64::from(k) + duty) / fs]).skip(1).collect();
+    let found = jumps("buck_pwm");
+    assert_eq!(found.len(), expected.len());
+    let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("event times off by {off:.1e} s");
+    assert!(off <= 1e-17, "{off:e}");
+}
+
+/// Where a decreasing or increasing function of time crosses 0.
+fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let sign = f(low).signum();
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if f(middle).signum() == sign { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[test]
+fn the_end_stop_is_met_and_left_as_piece_by_piece() {
+    let (m, push, stop, k, d) = (2.0f64, 20.0, 0.05, 80e3, 100.0);
+    let (decay, rest) = (d / (2.0 * m), push / k);
+    let wd = (k / m - decay * decay).sqrt();
+    // In contact y = x − stop swings about its rest; (y, v) after s seconds from (0, v0).
+    let contact = |v0: f64, s: f64| {
+        let (y0, sin, cos) = (-rest, (wd * s).sin(), (wd * s).cos());
+        let b = (v0 + decay * y0) / wd;
+        let fades = (-decay * s).exp();
+        let y = fades * (y0 * cos + b * sin);
+        let v = fades * ((b * wd - decay * y0) * cos - (y0 * wd + decay * b) * sin);
+        (rest + y, v)
+    };
+    let force = |(y, v): (f64, f64)| k * y + d * v;
+    // Pieces: start, whether in contact, x and v there.
+    let mut pieces = vec![(0.0, false, 0.0, 0.0)];
+    let mut jumps_expected = vec![];
+    while pieces.last().unwrap().0 < 0.5 {
+        let (t, touches, x, v) = *pieces.last().unwrap();
+        let a = push / m;
+        let next = if touches {
+            // The force falls to 0 before the spring is slack: then it flies. Or it stays for good.
+            let steps = (1..4000).map(|i| f64::from(i) * 1e-5);
+            match steps.clone().find(|s| force(contact(v, *s)) < 0.0) {
+                Some(s) => {
+                    let s = bisect(|s| force(contact(v, s)), s - 1e-5, s);
+                    let (y, v) = contact(v, s);
+                    (t + s, false, stop + y, v)
+                }
+                None => break,
+            }
+        } else {
+            // x + v·s + a/2·s² = stop
+            let s = (-v + (v * v + 2.0 * a * (stop - x)).sqrt()) / a;
+            jumps_expected.push(t + s);
+            (t + s, true, stop, v + a * s)
+        };
+        pieces.push(next);
+    }
+    jumps_expected.retain(|t| *t < 0.5);
+    let exact = |t: f64| {
+        let (start, touches, x, v) = *pieces.iter().rev().find(|piece| piece.0 <= t).unwrap();
+        let s = t - start;
+        if touches {
+            let (y, v) = contact(v, s);
+            (stop + y, v, force((y, v)).max(0.0))
+        } else {
+            (x + v * s + 0.5 * push / m * s * s, v + push / m * s, 0.0)
+        }
+    };
+    let (trace, statistics) = circuit("jumping_stop");
+    let times = trace.time().to_vec();
+    let (own, own_statistics) = own_equations("jumping_stop", &times);
+    let column = |pick: fn((f64, f64, f64)) -> f64| -> Vec<f64> {
+        times.iter().map(|t| pick(exact(*t))).collect()
+    };
+    let (x, v, f) = (column(|e| e.0), column(|e| e.1), column(|e| e.2));
+    // Each impact makes more of the errors before it.
+    for (name, exact) in [("x", &x), ("v", &v), ("F", &f)] {
+        assert!(worst(&trace, name, exact) <= 1e-4, "{name}: {statistics}");
+        assert!(worst(&own, name, exact) <= 1e-6, "{name}: {own_statistics:?}");
+    }
+    let found = jumps("jumping_stop");
+    assert_eq!(found.len(), jumps_expected.len(), "{found:?} for {jumps_expected:?}");
+    let off = found.iter().zip(&jumps_expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("{} impacts, their times off by {off:.1e} s", found.len());
+    assert!(off <= 1e-6, "{off:e}");
+    assert_eq!(statistics.slides, 0, "{statistics}");
+}
+
+#[test]
+fn the_mass_on_the_belt_sticks_and_slips() {
+    let reference = csv::read(file("tests/reference/events/dry_belt.csv").as_bytes()).unwrap();
+    let (trace, statistics) = circuit("dry_belt");
+    let (own, _) = own_equations("dry_belt", reference.time());
+    for name in ["x", "v", "F"] {
+        let exact = reference.column(name).unwrap();
+        // The ramp's width, a millionth of the range of the sliding speed, moves each break-away by so much.
+        let (ours, second) = (worst(&trace, name, exact), worst(&own, name, exact));
+        if name != "F" {
+            assert!(ours <= 1e-4, "{name}: {statistics}");
+            assert!(second <= 1e-5, "{name}");
+        }
+    }
+    assert_eq!(statistics.warnings.len(), 1, "{statistics}");
+    assert!(statistics.slides >= 4, "{statistics}");
+}
