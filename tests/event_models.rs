@@ -216,9 +216,9 @@ fn the_end_stop_is_met_and_left_as_piece_by_piece() {
             (x + v * s + 0.5 * push / m * s * s, v + push / m * s, 0.0)
         }
     };
-    let (trace, statistics) = circuit("jumping_stop");
+    let (trace, statistics) = circuit("end_stop");
     let times = trace.time().to_vec();
-    let (own, own_statistics) = own_equations("jumping_stop", &times);
+    let (own, own_statistics) = own_equations("end_stop", &times);
     let column = |pick: fn((f64, f64, f64)) -> f64| -> Vec<f64> {
         times.iter().map(|t| pick(exact(*t))).collect()
     };
@@ -228,7 +228,7 @@ fn the_end_stop_is_met_and_left_as_piece_by_piece() {
         assert!(worst(&trace, name, exact) <= 1e-4, "{name}: {statistics}");
         assert!(worst(&own, name, exact) <= 1e-6, "{name}: {own_statistics:?}");
     }
-    let found = jumps("jumping_stop");
+    let found = jumps("end_stop");
     assert_eq!(found.len(), jumps_expected.len(), "{found:?} for {jumps_expected:?}");
     let off = found.iter().zip(&jumps_expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     println!("{} impacts, their times off by {off:.1e} s", found.len());
@@ -238,9 +238,9 @@ fn the_end_stop_is_met_and_left_as_piece_by_piece() {
 
 #[test]
 fn the_mass_on_the_belt_sticks_and_slips() {
-    let reference = csv::read(file("tests/reference/events/dry_belt.csv").as_bytes()).unwrap();
-    let (trace, statistics) = circuit("dry_belt");
-    let (own, _) = own_equations("dry_belt", reference.time());
+    let reference = csv::read(file("tests/reference/events/stick_slip.csv").as_bytes()).unwrap();
+    let (trace, statistics) = circuit("stick_slip");
+    let (own, _) = own_equations("stick_slip", reference.time());
     for name in ["x", "v", "F"] {
         let exact = reference.column(name).unwrap();
         // The ramp's width, a millionth of the range of the sliding speed, moves each break-away by so much.

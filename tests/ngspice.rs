@@ -141,6 +141,9 @@ fn the_actuator_on_a_step() {
     }
 }
 
+/// Models whose laws jump.
+const EVENTS: [&str; 3] = ["buck_pwm.bg", "end_stop.bg", "stick_slip.bg"];
+
 #[test]
 fn every_model_gives_what_its_own_equations_give() {
     if !ngspice() {
@@ -182,7 +185,10 @@ fn every_model_gives_what_its_own_equations_give() {
                 pairs.push((name.as_str(), name.as_str()));
             }
         }
-        check(&path.display().to_string(), &trace, &reference, &pairs, step * 1e-3, 5e-4);
+        // ngspice meets a condition by steps, of a tenth of the interval at most, and is that late.
+        let events = EVENTS.iter().any(|name| path.starts_with(name));
+        let (rise, tolerance) = if events { (0.1 * step, 1e-3) } else { (1e-3 * step, 5e-4) };
+        check(&path.display().to_string(), &trace, &reference, &pairs, rise, tolerance);
     }
 }
 

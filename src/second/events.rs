@@ -15,6 +15,8 @@ const LOCATED: f64 = 1e-11;
 const RAMP: f64 = 1e-7;
 /// Errors of a guard by this part of what is allowed to the unknowns are none.
 const NOISE: f64 = 1e-3;
+/// How often a ramp is made four times as wide, at most.
+const WIDENED: i32 = 8;
 /// How often a condition comes back at once before it becomes a ramp.
 const RETURNS: u32 = 3;
 /// Intervals in which a step is searched.
@@ -35,8 +37,12 @@ struct State {
     low: f64,
     high: f64,
     size: f64,
-    /// What the errors that are allowed make of it.
+    /// What the errors that are allowed make of it, and the least width of a ramp: what the law makes of the rounding of
+    /// the unknowns on it must stay below what is allowed.
     noise: f64,
+    least: f64,
+    /// How often its ramp has been made wider.
+    widened: i32,
     away: f64,
     returns: u32,
 }
@@ -133,7 +139,8 @@ impl State {
 
     fn ramp(&mut self, edge: f64) {
         let spread = (self.high - self.low).max(1e-3 * self.size);
-        let width = (RAMP * spread).max(self.noise).max(f64::MIN_POSITIVE * 1e16);
+        let width = (RAMP * spread).max(self.least).max(f64::MIN_POSITIVE * 1e16);
+        let width = width * 4f64.powi(self.widened);
         (self.edge, self.slope, self.returns) = (edge, 1.0 / width, 0);
         if self.question == Question::Floor {
             self.mode = edge;
@@ -154,6 +161,8 @@ impl Conditions {
             high: f64::NEG_INFINITY,
             size: 0.0,
             noise: 0.0,
+            least: 0.0,
+            widened: 0,
             away: 0.0,
             returns: 0,
         };
@@ -184,15 +193,16 @@ impl Conditions {
         }
     }
 
-    /// Works out what errors as large as `allowed` make of the guards.
+    /// Works out what errors as large as `allowed`, in parts of the unknowns `tolerance`, make of the guards.
     pub fn see_noise(
         &mut self,
         compiled: &mut Compiled,
-        t: f64,
-        inside: f64,
+        [t, inside]: [f64; 2],
         y: &[f64],
         allowed: &[f64],
+        tolerance: f64,
     ) {
+        let rounding = (f64::EPSILON / (tolerance * tolerance)).clamp(1.0, 1e2);
         let mut seed = 0x9e37_79b9_7f4a_7c15;
         let mut moved = self.values.clone();
         compiled.guards(t, inside, y, &mut self.values);
@@ -208,6 +218,7 @@ impl Conditions {
                 let change = (at(&moved) - at(&self.values)).abs();
                 if change.is_finite() {
                     state.noise = state.noise.max(change);
+                    state.least = rounding * state.noise;
                 }
             }
         }
@@ -231,6 +242,22 @@ impl Conditions {
             }
             compiled.hold(k, state.value(), state.slope);
         }
+    }
+
+    /// Makes the ramps that the solution is on wider, where steps have become too small on them: what the law makes of
+    /// rounding is then more than is allowed. Says whether there are any.
+    pub fn widen(&mut self, compiled: &mut Compiled) -> bool {
+        let mut any = false;
+        for (k, state) in self.states.iter_mut().enumerate() {
+            if state.slope != 0.0 && state.widened < WIDENED {
+                state.widened += 1;
+                state.slope *= 0.25;
+                compiled.hold(k, state.value(), state.slope);
+                any = true;
+            }
+        }
+        (self.target, self.tries) = (None, 0);
+        any
     }
 
     /// Lets all go.

@@ -230,7 +230,7 @@ fn march(
         let mut t = from;
         while t < to {
             let weights = sizes.weights(settings.tolerance, pilot);
-            conditions.see_noise(compiled, t, inside, &y, &weights);
+            conditions.see_noise(compiled, [t, inside], &y, &weights, settings.tolerance);
             let mut radau = Radau::new(compiled, weights);
             radau.growing = if pilot { settings.tolerance } else { 0.0 };
             if pilot {
@@ -256,6 +256,10 @@ fn march(
             sizes.see(&y);
             let ended = match outcome {
                 Ok(ended) => ended,
+                Err(Stop::StepTooSmall { .. }) if conditions.widen(compiled) => {
+                    t = reached;
+                    continue;
+                }
                 // A branch may have no values past its threshold, where the other one has.
                 Err(Stop::StepTooSmall { .. }) if !was_loose && !conditions.is_empty() => {
                     conditions.let_go(compiled);

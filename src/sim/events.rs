@@ -26,7 +26,7 @@ const NOISE: f64 = 1e-3;
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The width of a ramp, as a part of the range that its guard has run through.
-const RAMP: f64 = 1e-6;
+const RAMP: f64 = 1e-7;
 
 /// How often a guard comes back before it has left its threshold, until it is said to slide.
 const BOUNCES: u32 = 4;
@@ -235,6 +235,11 @@ impl Network<'_> {
         (0..self.system.modes.len()).any(|mode| self.hold(mode) == FREE)
     }
 
+    /// Whether the solution slides along any.
+    pub(crate) fn any_ramped(&self) -> bool {
+        (0..self.system.modes.len()).any(|mode| self.hold(mode) == RAMPED)
+    }
+
     /// How far a guard is past the threshold of the mode it is in (positive: it must change).
     pub(crate) fn excess(&self, mode: usize, a: f64, b: f64) -> f64 {
         let value = self.mode(mode);
@@ -350,10 +355,12 @@ impl Network<'_> {
     }
 
     /// Makes a condition a ramp around the threshold that it stands at; says its width.
-    pub(crate) fn ramp(&mut self, mode: usize, a: f64, b: f64) -> f64 {
+    pub(crate) fn ramp(&mut self, mode: usize, a: f64, b: f64, reltol: f64) -> f64 {
+        // What the law makes of the rounding of the unknowns must stay below what is allowed to it.
+        let rounding = (f64::EPSILON / (reltol * reltol)).clamp(1.0, 1e2);
         let track = &self.tracks[mode];
         let spread = if track.spread() > 0.0 { track.spread() } else { track.size };
-        let noise = track.noise / NOISE;
+        let noise = rounding * track.noise / NOISE;
         let width = (RAMP * spread).max(noise).max(f64::MIN_POSITIVE / ROUNDING);
         self.set_ramp(mode, a, b, width);
         width

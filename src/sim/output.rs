@@ -341,7 +341,9 @@ impl Inside {
         for (k, w) in self.point.w.iter_mut().enumerate() {
             *w = from.w[k] + theta * (to.w[k] - from.w[k]);
         }
-        self.finish_point(network, time, false, weights, work)
+        // On a ramp laws make much of the least error of a charge: what was interpolated stands.
+        let ramped = network.any_ramped();
+        self.finish_point(network, time, ramped, weights, work)
     }
 
     /// The same by a step of its own, so that algebraic relations between charges and rates hold.

@@ -340,7 +340,7 @@ impl Run<'_> {
         }
         *count += 1;
         let crowded = *count > CROWD;
-        let Run { network, controls, crossed, .. } = self;
+        let Run { network, controls, crossed, settings, .. } = self;
         if crowded && !network.is_condition(mode) {
             let trouble = Trouble::Modes(network.system.modes[mode].device);
             let time = self.state.t;
@@ -372,7 +372,7 @@ impl Run<'_> {
         }
         crossed.clear();
         if slides {
-            let width = network.ramp(mode, a, b);
+            let width = network.ramp(mode, a, b, settings.reltol);
             self.say_slide(&Slide { mode, width });
         }
         self.restart(Moment::Restart)?;

@@ -1,4 +1,4 @@
-"""Writes dry_belt.csv: the mass of models/dry_belt.bg, phase by phase, each ended by its event.
+"""Writes stick_slip.csv: the mass of models/stick_slip.bg, phase by phase, each ended by its event.
 
 Stick: v = v_belt, F = k*x, until k*x = Fs. Slip: DOP853 at 1e-13 until v comes back to v_belt from below; then it sticks,
 because |k*x| < Fs there.
@@ -47,7 +47,7 @@ while t < until:
     events.append(end)
     t, x = end, s.y_events[0][0][0]
     assert abs(k * x) < Fs
-with open("dry_belt.csv", "w", newline="") as handle:
+with open("stick_slip.csv", "w", newline="") as handle:
     writer = csv.writer(handle, lineterminator="\n")
     writer.writerow(["time", "x", "v", "F"])
     for i, r in enumerate(rows):
