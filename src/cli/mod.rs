@@ -16,6 +16,7 @@ pub mod verify;
 pub mod compare;
 pub mod causality;
 pub mod trace;
+pub mod fmt;
 pub mod examples;
 pub mod completions;
 pub mod man;
@@ -67,6 +68,7 @@ pub const COMMANDS: &[Command] = &[
     command!(compare),
     command!(causality),
     command!(trace),
+    command!(fmt),
     command!(examples),
     command!(completions),
     command!(man),

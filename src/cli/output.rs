@@ -26,6 +26,11 @@ impl NewFile {
     /// The exit code, when the reason has been said.
     pub fn create(name: &str, session: &mut Session) -> Result<NewFile, Exit> {
         session.spare_inputs(name)?;
+        NewFile::replace(name, session)
+    }
+
+    /// Begins a file that may take the place of an input.
+    fn replace(name: &str, session: &mut Session) -> Result<NewFile, Exit> {
         let begin = || -> io::Result<NewFile> {
             let path = Path::new(name);
             // A link stays one: what it leads to is replaced.
@@ -90,6 +95,22 @@ pub fn write_text(to: Option<&str>, text: &str, session: &mut Session) -> Result
             written.map(|_| ()).map_err(|error| session.unwritable(name, &error))
         }
     }
+}
+
+/// Puts another text into a file that was read, which keeps its permissions.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn replace_text(name: &str, text: &str, session: &mut Session) -> Result<(), Exit> {
+    let mut file = NewFile::replace(name, session)?;
+    let written = (|| {
+        file.file.write_all(text.as_bytes())?;
+        if file.temporary.is_some() {
+            file.file.set_permissions(file.target.metadata()?.permissions())?;
+        }
+        file.close(true)
+    })();
+    written.map(|_| ()).map_err(|error| session.unwritable(name, &error))
 }
 
 /// Where rows go while they are computed.

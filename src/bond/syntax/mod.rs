@@ -6,13 +6,17 @@
 pub mod tree;
 pub mod token;
 mod scan;
+mod classes;
+mod format;
 mod parse;
 mod statement;
 mod expression;
 mod expected;
 mod data;
 
+pub use classes::{Class, tokens};
 pub use data::data_files;
+pub use format::{WIDTH, format, layout, same_tokens};
 pub use parse::{parse, parse_drive, parse_observe, parse_value};
 pub use scan::STATEMENT_WORDS;
 pub use tree::{

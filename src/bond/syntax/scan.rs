@@ -22,7 +22,7 @@ pub const BLOCK_WORDS: &[&str] = &["model", "for", "if"];
 pub struct Scan<'a> {
     file: FileId,
     text: &'a str,
-    tokens: Vec<Token>,
+    pub(super) tokens: Vec<Token>,
     masked: String,
 }
 
@@ -87,8 +87,13 @@ impl<'a> Scan<'a> {
         self.masked.get(span.start as usize..span.end as usize).unwrap_or("")
     }
 
+    /// The first token that begins at a byte or after it.
+    pub fn token_at(&self, byte: u32) -> usize {
+        self.tokens.partition_point(|token| token.start < byte)
+    }
+
     /// The first token at or after `from` that says something.
-    fn significant(&self, from: usize) -> Option<usize> {
+    pub fn significant(&self, from: usize) -> Option<usize> {
         let rest = self.tokens.get(from..)?;
         rest.iter().position(Token::says_something).map(|skipped| from + skipped)
     }

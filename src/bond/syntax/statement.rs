@@ -83,7 +83,7 @@ pub(super) fn first_word(masked: &str) -> &str {
 
 /// The statement word that a statement begins with, unless it is the name of an element there: before an arrow, a
 /// dot, a comma, a bracket or a colon, or alone.
-fn statement_word(masked: &str) -> Option<&'static str> {
+pub(super) fn statement_word(masked: &str) -> Option<&'static str> {
     let first = first_word(masked);
     let word = STATEMENT_WORDS.iter().find(|word| **word == first)?;
     let after = masked[first.len()..].trim_start_matches([' ', '\n']);
@@ -276,7 +276,11 @@ fn chain_end(
     for part in pair.into_inner() {
         match part.as_rule() {
             Rule::kind => kind = Some(reader.name(&part)),
-            Rule::path => path = Some(reader.path(part, d)?),
+            Rule::path => {
+                if let Some(before) = path.replace(reader.path(part, d)?) {
+                    kind = Some(kind_of(before, d)?);
+                }
+            }
             Rule::element_arguments => {
                 let place = reader.place(&part);
                 let mut rows = reader.arguments(part.into_inner(), d)?;
@@ -297,6 +301,19 @@ fn chain_end(
         }
     }
     Some(ChainEnd { kind, path: path?, arguments, span })
+}
+
+/// What stands before a colon.
+fn kind_of(path: Path, d: &mut Vec<Diagnostic>) -> Option<Name> {
+    if path.members.is_empty() && path.name.indices.is_empty() {
+        return Some(Name { text: path.name.text, span: path.span });
+    }
+    d.push(
+        Diagnostic::error("E0101", path.span, "a kind is one word")
+            .says("expected an arrow or the end of the statement after this")
+            .help("write the kind before the colon and the name after it, as in `R:load[2]`"),
+    );
+    None
 }
 
 fn observed_items(

@@ -476,7 +476,7 @@ fn indexed_names() {
         "param R[k] = 2 Ohm \"of phase k\"",
         "signal x[k, 2] = integ(f(rod[k]))",
         "input x[k], y",
-        "output x[1], y [2]",
+        "output x[1], y[2]",
         "drive x[k] = step(0, 0, 1)",
         "observe e(eha[1].pump) in bar, sum(k in 1..3, x[k]) as \"all\"",
         "input[2] -> R:for[3]",
