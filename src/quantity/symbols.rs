@@ -98,7 +98,7 @@ pub const PREFIXES: &[(&str, f64)] = &[
 
 /// Words that never are units.
 pub(super) const NEVER: &[&str] =
-    &["and", "or", "not", "then", "else", "step", "until", "in", "as"];
+    &["and", "or", "not", "then", "else", "step", "until", "in", "as", "follows"];
 
 /// The powers of ten that doubles hold exactly, so that `mm` is a division by 1000 and not a product with 0.001.
 fn scale(prefix: f64, factor: f64) -> f64 {

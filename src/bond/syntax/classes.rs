@@ -139,7 +139,11 @@ fn classify(scan: &Scan<'_>, range: std::ops::Range<usize>, span: Span, classes:
                     Class::Word
                 } else if depth == 0 && k == 1 && word == "model" {
                     Class::ElementKind
-                } else if depth == 0 && inner.contains(&text(k)) && in_place(word, k, before) {
+                } else if depth == 0
+                    && inner.contains(&text(k))
+                    && in_place(word, k, before)
+                    && !second_word(word, k, &significant, classes)
+                {
                     Class::Word
                 } else if word == "port" && depth == 0 && !names_a_port(k, before) {
                     Class::Domain
@@ -174,6 +178,13 @@ fn in_place(word: &str, k: usize, before: Option<Kind>) -> bool {
         "observe" => !matches!(before, Some(Kind::Comma | Kind::Operator | Kind::Dot)) && k > 1,
         _ => !matches!(before, Some(Kind::Operator | Kind::Dot)) && k > 2,
     }
+}
+
+/// Whether a word stands directly before: then a value begins here, but after the first word of a statement.
+fn second_word(word: &str, k: usize, significant: &[usize], classes: &[Class]) -> bool {
+    let before = k.checked_sub(1).and_then(|k| significant.get(k));
+    let after_word = before.is_some_and(|before| classes[*before] == Class::Word);
+    after_word && !(k == 1 && matches!(word, "port" | "simulate"))
 }
 
 /// Whether the name at `k` of `port in NAME : DOMAIN` is the port's.

@@ -69,7 +69,8 @@ pub fn layout(text: &str) -> String {
                 let from = scan.token_at(piece.span.start);
                 layout.between(at..from);
                 layout.piece(&piece);
-                piece.next
+                // A comment after the statement is laid out with what comes next.
+                if piece.opens.is_some() { piece.next } else { scan.token_at(piece.span.end) }
             }
             Step::Closes(brace, next) => {
                 let from = scan.token_at(brace.start);

@@ -26,4 +26,8 @@ pub use tree::{
 };
 
 #[cfg(test)]
+mod generate;
+#[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
 mod tests;

@@ -51,8 +51,7 @@ pub(super) fn read(scan: &Scan<'_>, piece: &Piece, d: &mut Vec<Diagnostic>) -> O
         return None;
     }
     let word = statement_word(scan.masked(piece.span));
-    let row = STATEMENTS.iter().find(|(name, _)| Some(*name) == word);
-    let rule = row.map_or(Rule::chain_statement, |(_, rule)| *rule);
+    let rule = rule(scan.masked(piece.span));
     let (mut reader, pairs) = pairs(scan, piece, rule, d)?;
     let reader = &mut reader;
     Some(match rule {
@@ -68,6 +67,13 @@ pub(super) fn read(scan: &Scan<'_>, piece: &Piece, d: &mut Vec<Diagnostic>) -> O
         Rule::model_head => Said::Head(model(reader, pairs, d)?),
         _ => plain(word.unwrap_or(""), reader, pairs, d)?,
     })
+}
+
+/// The rule of a statement, by its first word.
+pub(super) fn rule(masked: &str) -> Rule {
+    let word = statement_word(masked);
+    let row = STATEMENTS.iter().find(|(name, _)| Some(*name) == word);
+    row.map_or(Rule::chain_statement, |(_, rule)| *rule)
 }
 
 /// Whether a piece begins as a block's head does.
@@ -86,9 +92,11 @@ pub(super) fn first_word(masked: &str) -> &str {
 pub(super) fn statement_word(masked: &str) -> Option<&'static str> {
     let first = first_word(masked);
     let word = STATEMENT_WORDS.iter().find(|word| **word == first)?;
-    let after = masked[first.len()..].trim_start_matches([' ', '\n']);
+    let rest = &masked[first.len()..];
+    let after = rest.trim_start_matches([' ', '\n']);
     let name = after.is_empty()
-        || ["->", "|->", ".", ",", "["].iter().any(|sign| after.starts_with(sign))
+        || rest.starts_with('.')
+        || ["->", "|->", ",", "["].iter().any(|sign| after.starts_with(sign))
         || (after.starts_with([':', '(']) && !matches!(*word, "observe" | "if"));
     (!name).then_some(word)
 }
