@@ -104,7 +104,8 @@ fn bracket_length(text: &str, depth: u32) -> usize {
 fn factor_length(text: &str, depth: u32) -> usize {
     let name = name_length(text);
     let base = if name > 0 {
-        if is_unit_name(&text[..name]) { name } else { 0 }
+        // `3 V*min(a, b)` calls a function.
+        if is_unit_name(&text[..name]) && !text[name..].starts_with('(') { name } else { 0 }
     } else {
         bracket_length(text, depth)
     };

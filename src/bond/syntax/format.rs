@@ -59,6 +59,7 @@ pub fn layout(text: &str) -> String {
         blocks: vec![],
         breaks: 0,
         begins: true,
+        on_line: false,
     };
     let mut at = 0;
     // The parser has found the text without errors.
@@ -152,6 +153,8 @@ struct Layout<'a> {
     breaks: usize,
     /// Whether nothing stands yet in the file or block, so that no empty line comes next.
     begins: bool,
+    /// Whether the author's line goes on: a comment belongs to what stands on it.
+    on_line: bool,
 }
 
 impl Layout<'_> {
@@ -177,6 +180,7 @@ impl Layout<'_> {
         }
         self.breaks = 0;
         self.begins = false;
+        self.on_line = true;
         let last = self.lines.len() - 1;
         &mut self.lines[last]
     }
@@ -201,7 +205,10 @@ impl Layout<'_> {
         for at in range {
             let token = self.scan.tokens[at];
             match token.kind {
-                Kind::LineEnd => self.breaks += 1,
+                Kind::LineEnd => {
+                    self.breaks += 1;
+                    self.on_line = false;
+                }
                 Kind::Comment => self.comment(&token, self.indent()),
                 Kind::Semicolon if self.breaks > 0 || self.lines.is_empty() => self.put(";", ""),
                 Kind::Semicolon => {
@@ -217,7 +224,10 @@ impl Layout<'_> {
 
     fn comment(&mut self, token: &Token, indent: usize) {
         let text = token.text(self.scan.text()).trim_end().to_string();
-        self.line(indent).comment = Some(text);
+        match self.lines.last_mut() {
+            Some(line) if self.on_line && line.comment.is_none() => line.comment = Some(text),
+            _ => self.line(indent).comment = Some(text),
+        }
     }
 
     /// A statement, or a block's head and its brace.
@@ -248,6 +258,7 @@ impl Layout<'_> {
             }
             self.breaks = 0;
             self.begins = false;
+            self.on_line = true;
         } else {
             for (k, line) in lines.into_iter().enumerate() {
                 self.breaks = usize::from(k > 0);

@@ -18,7 +18,7 @@ const UNITS: &[&str] =
 const KINDS: &[&str] =
     &["0", "1", "Se", "R", "C", "IC", "MTF", "GY", "DcMotor", "De", "in", "Φ", "12"];
 const DOMAINS: &[&str] = &["electrical", "rotation", "pseudo-thermal", "any"];
-const CALLED: &[&str] = &["e", "f", "integ", "pi", "lag", "pwl", "step", "orifice", "g"];
+const CALLED: &[&str] = &["e", "f", "integ", "pi", "lag", "pwl", "step", "orifice", "Φ"];
 const COMMENTS: &[&str] = &["# a comment", "#", "#  ; } \" ( μ", "#x  "];
 
 impl Generator {
@@ -413,7 +413,7 @@ impl Generator {
             let sign = self.pick(&["+", "-", "*", "/", "^"]);
             // A power of a unit is the unit's.
             let next = match sign {
-                "^" => format!("({})", self.atom(depth - 1)),
+                "^" => format!("(x + {})", self.atom(depth - 1)),
                 _ => self.atom(depth - 1),
             };
             text = format!("{text}{}{sign}{}{next}", self.blank(), self.blank());

@@ -211,6 +211,9 @@ impl Blocks<'_> {
     fn close_before_model(&mut self, start: Span, d: &mut Vec<Diagnostic>) {
         let indent = |span: Span| self.scan.indent(span.start);
         let Some(outer) = self.open.first() else { return };
+        if !self.scan.lacks_braces() {
+            return;
+        }
         if let (Some(outer), Some(here)) = (indent(outer.start), indent(start))
             && here <= outer
         {

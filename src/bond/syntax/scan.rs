@@ -24,6 +24,8 @@ pub struct Scan<'a> {
     text: &'a str,
     pub(super) tokens: Vec<Token>,
     masked: String,
+    /// `{` that are more than the `}`.
+    unclosed: i64,
 }
 
 /// One statement's text, or that of a block's head.
@@ -54,7 +56,17 @@ impl<'a> Scan<'a> {
     /// Cuts a text into tokens.
     pub fn new(file: FileId, text: &'a str) -> Scan<'a> {
         let (tokens, masked) = cut(text);
-        Scan { file, text, tokens, masked }
+        let unclosed = tokens.iter().fold(0, |count, token| match token.kind {
+            Kind::Open(b'{') => count + 1,
+            Kind::Close(b'}') => count - 1,
+            _ => count,
+        });
+        Scan { file, text, tokens, masked, unclosed }
+    }
+
+    /// Whether the file has fewer `}` than `{`.
+    pub fn lacks_braces(&self) -> bool {
+        self.unclosed > 0
     }
 
     /// The text as it is.
