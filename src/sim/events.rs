@@ -271,13 +271,18 @@ impl Network<'_> {
         (LOCATED * spread).max(ROUNDING * track.size)
     }
 
-    /// The distance that rounding may make of a guard.
+    /// The distance that rounding and the search for a crossing may make of a guard.
     pub(crate) fn slack(&self, mode: usize, a: f64) -> f64 {
         match self.system.modes[mode].guard {
-            Guard::Switch { on, off, .. } => {
-                let rounding = SLACK * a.abs().max(on.abs()).max(off.abs());
-                rounding.max(self.tracks[mode].located)
-            }
+            Guard::Switch { .. } => self.rounding(mode, a).max(self.tracks[mode].located),
+            _ => self.room(mode),
+        }
+    }
+
+    /// The distance that rounding alone may make of it.
+    pub(crate) fn rounding(&self, mode: usize, a: f64) -> f64 {
+        match self.system.modes[mode].guard {
+            Guard::Switch { on, off, .. } => SLACK * a.abs().max(on.abs()).max(off.abs()),
             _ => self.room(mode),
         }
     }

@@ -136,11 +136,17 @@ impl Builder<'_> {
         let ground = self.ground();
         let number = Expr::number;
         let start = self.initial.signals.get(id.index()).copied().unwrap_or(0.0);
-        // A line loads what drives it: it may stand at the node of a signal, but not at one that carries power.
+        // A line loads what drives it: it may stand at a source of its own, but not where a capacitor, another line's end
+        // or the circuit would feel it.
         let is_signal = match &graph.signals[id.index()].law {
             SignalLaw::Memory { input, .. } => match &*input.node {
                 Node::Leaf(Leaf::Signal(of)) => {
-                    matches!(self.signal_places.get(of.index()), Some(Place::Node(_)))
+                    let driven = match &graph.signals[of.index()].law {
+                        SignalLaw::Waveform(_) => true,
+                        SignalLaw::Algebraic(law) => !matches!(*law.node, Node::Leaf(_)),
+                        _ => false,
+                    };
+                    driven && matches!(self.signal_places.get(of.index()), Some(Place::Node(_)))
                 }
                 _ => false,
             },

@@ -361,7 +361,8 @@ impl Run<'_> {
             let (a, b) = events::pair(&controls.left, other);
             let (a0, b0) = events::pair(&controls.right, other);
             let range = (a - b - (a0 - b0)).abs();
-            let room = 4.0 * network.slack(other, a).max(LOCATED * range);
+            // Not of how exactly the last crossing was found: that would grow from each to the next.
+            let room = 4.0 * network.rounding(other, a).max(LOCATED * range);
             if network.hold(other) == HELD && network.excess(other, a, b) >= -room {
                 if matches!(network.system.modes[other].guard, Guard::Switch { .. }) {
                     network.tracks[other].located = room;
