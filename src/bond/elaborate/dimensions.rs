@@ -5,8 +5,8 @@
 //! mistake gives one error. How the arguments of a function hang together is a table (`agreements`); what is said of a
 //! clash stands in `clashes`.
 //!
-//! A model without units is unchecked: in its expressions bare numbers, readings and `time` are unknown, and only what
-//! comes from outside with a unit has one.
+//! A model without units is unchecked: its bare numbers are unknown wherever they stand, and only a parameter that was
+//! given a unit from outside can clash with something in it.
 
 use super::agreements::{Agreement, Form, agreement};
 use super::clashes::{Clash, Side};
@@ -90,6 +90,8 @@ pub(super) struct Walk<'w, 'a> {
     pub own: Option<VertexId>,
     /// Whether the model that it stands in has units.
     strict: bool,
+    /// Whether a parameter with a unit was met.
+    named: bool,
     /// What was met and is not known, where somebody waits for it.
     pub open: Option<Vec<Open>>,
     /// Where clashes go; they are only looked for when there is a place.
@@ -100,7 +102,13 @@ impl<'w, 'a> Walk<'w, 'a> {
     /// A walk that finds dimensions and reports nothing, over expressions that stand where the scope is.
     pub fn new(scope: &'w mut Scope<'a>, own: Option<VertexId>) -> Walk<'w, 'a> {
         let strict = scope.has_units();
-        Walk { scope, own, strict, open: None, clashes: None }
+        Walk { scope, own, strict, named: false, open: None, clashes: None }
+    }
+
+    /// What the dimension of the expression that was walked over is good for: in a model without units nothing follows
+    /// from it unless a parameter with a unit takes part.
+    pub fn counts(&self, dim: Dim) -> Dim {
+        if self.strict || self.named { dim } else { Dim::Unknown }
     }
 
     /// The dimension of an expression.
@@ -156,9 +164,12 @@ impl<'w, 'a> Walk<'w, 'a> {
 
     /// Reports a clash, whose value is unknown.
     pub fn clash(&mut self, make: impl FnOnce(&mut Scope<'a>) -> Clash) -> Dim {
-        if self.clashes.is_some() && self.strict {
+        if self.clashes.is_some() {
             let clash = make(self.scope);
-            if let Some(clashes) = &mut self.clashes {
+            let parameter = |name: &Meaning| matches!(name, Meaning::Parameter(_));
+            if let Some(clashes) = &mut self.clashes
+                && (self.strict || clash.names.iter().any(parameter))
+            {
                 clashes.push(clash);
             }
         }
@@ -196,6 +207,8 @@ impl<'w, 'a> Walk<'w, 'a> {
                 self.same(expr, (a, x), (b, y), |_, a, b| Clash::sum(op, a, b))
             }
             Binary::Multiply => x.times(y),
+            // A reciprocal is one, in models without units too.
+            Binary::Divide if a.as_number() == Some(1.0) => y.inverse(),
             Binary::Divide => x.times(y.inverse()),
             Binary::Power => self.power((a, x), (b, y)),
             Binary::And | Binary::Or => self.pure(),
@@ -268,8 +281,7 @@ impl<'w, 'a> Walk<'w, 'a> {
             match name {
                 "pi" if self.strict => return Dim::Bare,
                 "pi" => return Dim::Unknown,
-                "time" if self.strict => return Dim::Known(SECOND),
-                "time" => return Dim::Unknown,
+                "time" => return Dim::Known(SECOND),
                 _ => {}
             }
             if self.scope.variable(name).is_some() {
@@ -300,7 +312,10 @@ impl<'w, 'a> Walk<'w, 'a> {
         match meaning {
             Some(Meaning::Parameter(id)) => match self.scope.parameter_dimensions[id.index()] {
                 Dim::Unknown => self.meet(Open::Parameter(id)),
-                known => known,
+                known => {
+                    self.named = true;
+                    known
+                }
             },
             Some(Meaning::Signal(id)) => {
                 match self.scope.signal_dimensions.get(id.index()).copied() {
@@ -340,9 +355,6 @@ impl<'w, 'a> Walk<'w, 'a> {
 
     /// A variable of a bond, from its domain.
     pub fn bond(&mut self, what: &str, bond: BondId) -> Dim {
-        if !self.strict {
-            return Dim::Unknown;
-        }
         match self.scope.graph.bond(bond).domain {
             Domain::Any => self.meet(Open::Bond(bond)),
             domain => Dim::of(variable_dimension(what, domain)),
@@ -424,7 +436,7 @@ impl<'w, 'a> Walk<'w, 'a> {
         }
         powers.resize(given.len(), 0);
         let given = given.into_iter().zip(powers);
-        let mut found = vec![];
+        let mut found: Vec<(usize, &syntax::Expr, Dim)> = vec![];
         for ((at, value), power) in given {
             // The coefficient of sⁿ, times sⁿ (in 1/s), is in the units of its polynomial.
             let mut dim = self.dimension(value);
@@ -435,6 +447,9 @@ impl<'w, 'a> Walk<'w, 'a> {
                 dim = Dim::of(seconds.and_then(|seconds| known.times(seconds)));
             }
             found.push((at, value, dim));
+        }
+        if row.form != Form::Plain {
+            usual_first(&mut found);
         }
         self.agree(row, expr, found)
     }
@@ -477,10 +492,40 @@ impl<'w, 'a> Walk<'w, 'a> {
             return Dim::Unknown;
         }
         match relations.of(row.result) {
-            Some(dimension) if self.strict || row.result != PURE => Dim::Known(dimension),
-            _ => Dim::Unknown,
+            // The sine of a bare number may be anything in a model without units.
+            Some(_)
+                if row.result == PURE
+                    && !self.strict
+                    && given.iter().any(|(_, _, dim)| dim.known().is_none()) =>
+            {
+                Dim::Unknown
+            }
+            Some(dimension) => Dim::Known(dimension),
+            None => Dim::Unknown,
         }
     }
+}
+
+/// Puts first what most values of a column are of, so that one wrong entry is one error.
+fn usual_first(found: &mut [(usize, &syntax::Expr, Dim)]) {
+    let columns = found.iter().map(|(at, ..)| *at).max().map_or(0, |last| last.min(2) + 1);
+    let usual: Vec<Dim> = (0..columns)
+        .map(|column| {
+            let mut counts: Vec<(Dim, usize)> = vec![];
+            for (_, _, dim) in
+                found.iter().filter(|(at, _, dim)| *at == column && dim.known().is_some())
+            {
+                match counts.iter_mut().find(|(known, _)| known == dim) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((*dim, 1)),
+                }
+            }
+            let most = counts.iter().map(|(_, count)| *count).max();
+            let first = counts.iter().find(|(_, count)| Some(*count) == most);
+            first.map_or(Dim::Unknown, |(dim, _)| *dim)
+        })
+        .collect();
+    found.sort_by_key(|(at, _, dim)| usual.get(*at) != Some(dim));
 }
 
 /// Terms of a sum that are looked at.

@@ -124,10 +124,11 @@ impl Stands<'_> {
 
     /// Its dimension as a whole value.
     pub fn dimension(self, walk: &mut Walk<'_, '_>) -> Dim {
-        match self {
+        let dim = match self {
             Stands::Written(expr) => walk.dimension(expr).whole(),
             Stands::Implied(part) => walk.named(part).whole(),
-        }
+        };
+        walk.counts(dim)
     }
 }
 
