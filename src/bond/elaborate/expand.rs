@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
 /// More elements, signals, parameters and instances than this are a slip of the pen.
-pub const MOST_PARTS: usize = 2_000_000;
+pub const MOST_PARTS: usize = 500_000;
 
 impl<'a> Scope<'a> {
     /// Collects every declaration of a program. `set`: what the command line sets, read.

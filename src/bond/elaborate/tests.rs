@@ -422,7 +422,7 @@ fn memories() {
         ("b", "(b_delay+1)"),
         ("c", "hysteresis -1 T of b"),
         ("g_z", "integ(((g-g_z)/0.001), implied)"),
-        ("g", "(g_z+clamp((f(U -> m)-g_z),(-(0.001*3)),(0.001*2)))"),
+        ("g", "(g_z+clamp((f(U -> m)-g_z),-(0.001*3),(0.001*2)))"),
         ("h", "Noise"),
         ("r_z", "integ(((r-r_z)/0.000002), implied)"),
     ] {
@@ -606,7 +606,7 @@ fn overrides_of_the_command_line() {
     let codes: Vec<&str> = built.d.iter().map(|d| d.code).collect();
     assert_eq!(
         codes,
-        ["E0301", "E0223", "E0223", "E0219", "E0104", "E0303", "E0226", "E0206"],
+        ["E0301", "E0223", "E0223", "E0226", "E0219", "E0104", "E0303", "E0206"],
         "\n{}",
         built.lines().join("\n")
     );

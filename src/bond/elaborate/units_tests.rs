@@ -192,7 +192,7 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
     ),
     ("signal a = table(time, [0 s, 1 V; 1 m, 2 V])", "E0306", &["1 m", "time"], "`table` mixes"),
     ("signal a = table(time, [0 s, 1 V; 1 s, 2 A])", "E0306", &["2 A", "1 V"], "`table` mixes"),
-    ("signal a = table(vt, [0 s, 1 V; 1 s, 2 V])", "E0306", &["0 s", "vt"], "`table` mixes"),
+    ("signal a = table(vt, [0 s, 1 V; 1 s, 2 V])", "E0306", &["vt", "0 s"], "`table` mixes"),
     (
         "signal a = step(3 V, 0 V, 1 V)",
         "E0306",
@@ -267,8 +267,8 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
     (
         "I:coils([1 mH, 2 uH; 2 uH, 1 kg*s])\nm -> coils.1\ncoils.2 -> R:d(1 Ohm)",
         "E0307",
-        &["1 mF", "R:d(1 Ohm)"],
-        "the value of the inertia `coils` is a capacitance (F)",
+        &["1 kg*s"],
+        "the value of the inertia `coils` is a value in kg*s",
     ),
     (
         "C:plate(e1 = q1*(1 mm + q2)/(3e-12 F), e2 = q1^2/(6e-12 F*m))\nm -> plate.1\nplate.2 -> I:mass(1 g)",
@@ -717,6 +717,10 @@ fn every_unit_of_the_shipped_models_matters() {
                     statement.strip_prefix("param ").and_then(|s| s.split_whitespace().next());
                 let points = |d: &Diagnostic| {
                     d.labels.iter().any(|label| {
+                        // What an instance is given may clash within its model, in a file of the library.
+                        if label.span.file != file.file {
+                            return true;
+                        }
                         let place = built.map.text(label.span);
                         let names = || place.split(|c: char| !(c.is_alphanumeric() || c == '_'));
                         place.contains(&new)
@@ -734,10 +738,12 @@ fn every_unit_of_the_shipped_models_matters() {
     }
     // What is made with a bare parameter is of an unknown unit: two_tank's discharge coefficient `Cd = 0.62` hides the
     // areas of the orifices, and with them Qs; the number of sections of hydraulic_line hides what is given to each. The
-    // supply of the buck converter stands alone before a ratio whose unit is unknown, since the switch's values 0 and 1
+    // supply of the buck converters stands alone before a ratio whose unit is unknown, since the switch's values 0 and 1
     // are bare.
     let unknown = [
         ("buck.bg", "24 V"),
+        ("buck_pwm.bg", "24 V"),
+        ("buck_pwm.bg", "20 kHz"),
         ("two_tank.bg", "1.5 cm^2"),
         ("two_tank.bg", "1.2 cm^2"),
         ("two_tank.bg", "1e-5 m^3/s"),

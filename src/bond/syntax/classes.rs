@@ -133,6 +133,11 @@ fn classify(scan: &Scan<'_>, range: std::ops::Range<usize>, span: Span, classes:
                 });
                 let sum = depth > 0 && text(k) == "in" && is_sum(k, &kind, &text);
                 let member = matches!(before, Some(Kind::Dot));
+                // An index stands directly behind the name that it is of.
+                let indexed = significant.get(k + 1).is_some_and(|next| {
+                    let next = scan.tokens[*next];
+                    next.kind == Kind::Open(b'[') && adjacent(token, next)
+                });
                 classes[*at] = if k == 0 && !word.is_empty() {
                     Class::Word
                 } else if EXPRESSION_WORDS.contains(&text(k)) && !member || sum {
@@ -141,6 +146,7 @@ fn classify(scan: &Scan<'_>, range: std::ops::Range<usize>, span: Span, classes:
                     Class::ElementKind
                 } else if depth == 0
                     && inner.contains(&text(k))
+                    && !indexed
                     && in_place(word, k, before)
                     && !second_word(word, k, &significant, classes)
                 {
