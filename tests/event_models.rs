@@ -28,7 +28,7 @@ fn circuit(model: &str) -> (Trace, Statistics) {
 #[track_caller]
 fn own_equations(model: &str, times: &[f64]) -> (Trace, second::radau::Statistics) {
     let mut map = SourceMap::default();
-    let id = map.add(&format!("{model}.bg"), file(&format!("models/{model}.bg")));
+    let id = map.add(format!("{model}.bg"), file(&format!("models/{model}.bg")));
     let mut d = vec![];
     let text = parse(&map, id, &mut d);
     let graph = elaborate(&text.into(), &map, &Overrides::default(), &mut d).unwrap();
@@ -47,7 +47,7 @@ fn own_equations(model: &str, times: &[f64]) -> (Trace, second::radau::Statistic
 /// The times with two rows in a run that follows its steps.
 fn jumps(model: &str) -> Vec<f64> {
     let mut map = SourceMap::default();
-    let id = map.add(&format!("{model}.bg"), file(&format!("models/{model}.bg")));
+    let id = map.add(format!("{model}.bg"), file(&format!("models/{model}.bg")));
     let mut d = vec![];
     let mut run = pipeline::prepare(&mut map, id, &Overrides::default(), None, &mut d).unwrap();
     run.settings.as_mut().unwrap().rows = Interval::Steps;

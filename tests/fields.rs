@@ -387,7 +387,9 @@ fn an_initial_effort_needs_one_charge() {
             plate.2 -> R:r(1)
             simulate until 1 step 0.1"
         );
-        run_text("plate.bg", &text, &Overrides::default()).map(|_| ()).map_err(|d| d[0].clone())
+        run_text("plate.bg", &text, &Overrides::default())
+            .map(|_| ())
+            .map_err(|d| Box::new(d[0].clone()))
     };
     assert!(said("e1_0 = 3, q2_0 = 1").is_ok());
     // A force that q1 alone makes: no q2 gives it.

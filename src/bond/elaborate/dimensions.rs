@@ -151,7 +151,7 @@ impl<'w, 'a> Walk<'w, 'a> {
             Node::If(condition, a, b) => {
                 self.dimension(condition);
                 let (x, y) = (self.dimension(a), self.dimension(b));
-                self.same(expr, (a, x), (b, y), |span, a, b| Clash::branches(span, a, b))
+                self.same(expr, (a, x), (b, y), Clash::branches)
             }
             Node::Table(..) => Dim::Unknown,
         }

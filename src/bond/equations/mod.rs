@@ -7,7 +7,7 @@
 //!
 //! One row of h for each port: a junction of k bonds has k, a one-port 1, a two-port 2; so there are as many rows as
 //! efforts and flows. No causality, no elimination, no circuit: ratios and gains stand as written and never divide.
-//! Signs are those of [`graph`](super::graph).
+//! Signs are those of [`graph`].
 
 pub mod known;
 pub mod compiled;

@@ -122,9 +122,8 @@ fn classify(scan: &Scan<'_>, range: std::ops::Range<usize>, span: Span, classes:
             Kind::Open(_) => depth += 1,
             Kind::Close(_) => depth = depth.saturating_sub(1),
             Kind::Name | Kind::Number if depth == 0 && word.is_empty() => {
-                if kind(k + 1) == Some(Kind::Colon) && before != Some(Kind::Dot) {
-                    classes[*at] = Class::ElementKind;
-                }
+                let declares = kind(k + 1) == Some(Kind::Colon) && before != Some(Kind::Dot);
+                classes[*at] = if declares { Class::ElementKind } else { classes[*at] };
             }
             Kind::Name => {
                 let call = significant.get(k + 1).is_some_and(|next| {
@@ -138,9 +137,9 @@ fn classify(scan: &Scan<'_>, range: std::ops::Range<usize>, span: Span, classes:
                     let next = scan.tokens[*next];
                     next.kind == Kind::Open(b'[') && adjacent(token, next)
                 });
-                classes[*at] = if k == 0 && !word.is_empty() {
-                    Class::Word
-                } else if EXPRESSION_WORDS.contains(&text(k)) && !member || sum {
+                let begins = k == 0 && !word.is_empty();
+                let joins = EXPRESSION_WORDS.contains(&text(k)) && !member || sum;
+                classes[*at] = if begins || joins {
                     Class::Word
                 } else if depth == 0 && k == 1 && word == "model" {
                     Class::ElementKind

@@ -48,7 +48,7 @@ pub fn same_tokens(a: &str, b: &str) -> bool {
     a.by_ref().eq(b.by_ref())
 }
 
-/// The layout of a text, as [`format`] gives it but for the check of its tokens.
+/// The layout of a text, as [`format()`] gives it but for the check of its tokens.
 pub fn layout(text: &str) -> String {
     let scan = Scan::new(Span::NONE.file, text);
     let classes = classes(&scan);
