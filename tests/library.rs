@@ -4,22 +4,14 @@
 //! The error is that of `trace::compare`: the largest difference over the reference's rows as a part of the
 //! reference's range.
 
+mod references;
+
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::pipeline::run_text;
 use bondspice::source::library::LIBRARY;
-use bondspice::trace::{Trace, compare, csv};
+use bondspice::trace::Trace;
+use references::{agree, common, file, options, reference};
 use std::f64::consts::PI;
-
-fn file(path: &str) -> String {
-    let path = format!("{}/{path}", env!("CARGO_MANIFEST_DIR"));
-    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-fn options(reltol: Option<&str>) -> Overrides {
-    let mut overrides = Overrides::default();
-    overrides.options.extend(reltol.map(|value| ("reltol".to_string(), value.to_string())));
-    overrides
-}
 
 /// Runs a text.
 #[track_caller]
@@ -36,22 +28,6 @@ fn shipped(model: &str, overrides: &Overrides) -> Trace {
     run(&format!("{model}.bg"), &file(&format!("models/{model}.bg")), overrides)
 }
 
-/// Compares a trace with a reference, and fails with all signals that differ by more than `tolerance`.
-#[track_caller]
-fn agree(what: &str, trace: &Trace, reference: &Trace, tolerance: f64) {
-    let settings = compare::Settings { tolerance, ..compare::Settings::default() };
-    let comparison = compare::compare(trace, reference, &settings);
-    let mut report = format!("{what}, tolerance {tolerance:e}:\n");
-    for signal in &comparison.signals {
-        let mark = if signal.same() { "    " } else { "<== " };
-        report += &format!("{mark}{} {:.2e} at {}\n", signal.name, signal.max, signal.at);
-    }
-    let columns = reference.names.len() - 1;
-    assert_eq!(comparison.signals.len(), columns, "{:?}, {:?}", trace.names, reference.names);
-    assert!(comparison.signals.iter().all(|signal| signal.same()), "{report}");
-    println!("{report}");
-}
-
 /// The equations are the same, so what is left is rounding and the choice of steps: nothing once both runs are far more
 /// exact than the tolerance.
 #[test]
@@ -63,25 +39,6 @@ fn the_actuator_of_components_is_the_flat_one() {
         assert_eq!(components.time(), flat.time());
         agree("eha_components", &components, &flat, tolerance);
     }
-}
-
-fn reference(path: &str) -> Trace {
-    csv::read(file(&format!("tests/reference/{path}.csv")).as_bytes())
-        .expect("the reference is a trace")
-}
-
-/// The reference's columns that the trace has too, time among them.
-fn common(trace: &Trace, reference: Trace, least: usize) -> Trace {
-    let mut kept = Trace::new(vec![], vec![]);
-    for (name, column) in reference.names.into_iter().zip(reference.columns) {
-        if trace.names.contains(&name) {
-            kept.names.push(name);
-            kept.units.push(String::new());
-            kept.columns.push(column);
-        }
-    }
-    assert!(kept.names.len() >= least, "{:?} against {:?}", trace.names, kept.names);
-    kept
 }
 
 /// A trace of functions of time over the rows of another.

@@ -579,16 +579,13 @@ impl<'a> Scope<'a> {
     /// Whether a name of the space of elements is still to be had; else an error.
     fn is_free(&mut self, key: &str, kind: &Name, end: &ChainEnd, d: &mut Vec<Diagnostic>) -> bool {
         let Some(first) = self.frame().things.get(key).copied() else { return true };
-        let (span, same) = match first {
-            Thing::Vertex(id) => {
-                let first = self.declarations[id.index()];
-                (first.span, first.element.kind == kind.text)
-            }
+        let span = self.thing_span(first);
+        let same = match first {
+            Thing::Vertex(id) => self.declarations[id.index()].element.kind == kind.text,
             Thing::Instance(frame) => {
-                let frame = &self.frames[frame.0 as usize];
-                (frame.span, self.bodies[frame.body].name == kind.text)
+                self.bodies[self.frames[frame.0 as usize].body].name == kind.text
             }
-            Thing::Port(port) => (self.ports[port.0 as usize].span, false),
+            Thing::Port(_) => false,
         };
         let again = same && end.arguments.is_none();
         let message = match again {

@@ -142,6 +142,15 @@ impl<'a> Scope<'a> {
         None
     }
 
+    /// Where a thing is declared.
+    pub fn thing_span(&self, thing: Thing) -> Span {
+        match thing {
+            Thing::Vertex(id) => self.declarations[id.index()].span,
+            Thing::Instance(frame) => self.frames[frame.0 as usize].span,
+            Thing::Port(port) => self.ports[port.0 as usize].span,
+        }
+    }
+
     /// Does something as if it stood elsewhere.
     pub fn at<T>(&mut self, here: Here, what: impl FnOnce(&mut Scope<'a>) -> T) -> T {
         let before = std::mem::replace(&mut self.here, here);

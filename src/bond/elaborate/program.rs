@@ -8,6 +8,7 @@ use crate::diagnostic::Diagnostic;
 use crate::quantity::nearest;
 use crate::source::loader::{self, LoadErrorKind};
 use crate::source::{FileId, SourceMap, Span, library};
+use std::path::Path;
 
 /// More files than this are a slip of the pen.
 const MOST_FILES: usize = 1000;
@@ -103,19 +104,18 @@ fn find(
         };
         return Some(map.add(text, content));
     }
-    let beside = map.file(importer).map_or("", |file| file.name.as_str());
+    let folders = folders.iter().map(|folder| Path::new(folder).join(text));
+    let folders = folders.map(|path| path.to_string_lossy().into_owned());
+    let beside = std::iter::once(map.beside(importer, text));
+    let tried: Vec<String> = beside.chain(folders).map(|path| clean(&path)).collect();
     // What the library imports stands in the library.
-    let beside = beside.rfind(['/', '\\']).map_or("", |end| &beside[..=end]).to_string();
-    let tried: Vec<String> = std::iter::once(beside.clone())
-        .chain(folders.iter().map(|folder| format!("{}/", folder.trim_end_matches('/'))))
-        .map(|folder| if text.starts_with('/') { text.to_string() } else { clean(&folder, text) })
-        .collect();
+    let of_library = map.file(importer).is_some_and(|file| file.name.starts_with("std/"));
     let mut first = None;
     for path in &tried {
         if let Some(known) = map.find(path) {
             return Some(known);
         }
-        if let Some(inside) = path.strip_prefix("std/").filter(|_| beside.starts_with("std/"))
+        if let Some(inside) = path.strip_prefix("std/").filter(|_| of_library)
             && let Some(content) = library::find(inside)
         {
             return Some(map.add(path.as_str(), content));
@@ -156,11 +156,10 @@ fn quoted(name: &Name, text: &str) -> (Span, String) {
     (name.span, format!("\"{text}\""))
 }
 
-/// A path beside a folder, `.` and `..` resolved as far as they can be, so that one file has one name.
-fn clean(folder: &str, path: &str) -> String {
+/// A path with `.` and `..` resolved as far as they can be, so that one file has one name.
+fn clean(path: &str) -> String {
     let mut parts: Vec<&str> = vec![];
-    let whole = format!("{folder}{path}");
-    for part in whole.split('/') {
+    for part in path.split('/') {
         match part {
             "." => {}
             ".." if parts.last().is_some_and(|last| !last.is_empty() && *last != "..") => {

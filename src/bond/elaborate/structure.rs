@@ -73,11 +73,7 @@ impl<'a> Scope<'a> {
     pub fn declare_port(&mut self, port: &'a syntax::Port, span: Span, d: &mut Vec<Diagnostic>) {
         let Some(key) = self.full_key(&port.name, d) else { return };
         if let Some(first) = self.frame().things.get(&key).copied() {
-            let first = match first {
-                Thing::Vertex(id) => self.declarations[id.index()].span,
-                Thing::Instance(frame) => self.frames[frame.0 as usize].span,
-                Thing::Port(port) => self.ports[port.0 as usize].span,
-            };
+            let first = self.thing_span(first);
             d.push(
                 Diagnostic::error("E0203", span, format!("`{key}` is declared twice"))
                     .says("declared again here")
@@ -87,8 +83,8 @@ impl<'a> Scope<'a> {
         }
         let mut domain = None;
         if let Some(name) = &port.domain {
-            match DOMAINS.iter().find(|row| row.name == name.text) {
-                Some(row) => domain = Some((row.domain, name.span)),
+            match Domain::named(&name.text) {
+                Some(known) => domain = Some((known, name.span)),
                 None => {
                     let error = Diagnostic::error(
                         "E0240",
