@@ -12,6 +12,7 @@
 
 mod names;
 mod forest;
+pub mod graphic;
 mod forms;
 mod islands;
 mod flows;
