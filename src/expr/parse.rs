@@ -275,17 +275,17 @@ fn call<L: Language>(
     let Some(meaning) = functions::find(L::DIALECT, name) else {
         return language.call(name, pair.clone(), d).map(measured);
     };
-    let mut arguments = vec![];
+    let (mut arguments, mut strange) = (vec![], false);
     for argument in inner {
         if L::role(argument.as_rule()) == Role::Expression {
             arguments.push(convert(language, argument, d));
         } else {
-            let place = language.span(argument.as_span());
-            d.push(Diagnostic::error(
-                "E0111",
-                place,
-                format!("`{name}` takes plain values, separated by commas"),
-            ));
+            // Said of the first; the others are alike.
+            if !std::mem::replace(&mut strange, true) {
+                let place = language.span(argument.as_span());
+                let message = format!("`{name}` takes plain values, separated by commas");
+                d.push(Diagnostic::error("E0111", place, message));
+            }
             arguments.push(None);
         }
     }

@@ -26,7 +26,8 @@ pub fn parse(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> File {
     let text = map.file(file).map_or("", |file| file.text.as_str());
     let scan = Scan::new(file, text);
     let mut errors = 0;
-    let mut seen = d.len();
+    let first = d.len();
+    let mut seen = first;
     let mut blocks = Blocks { scan: &scan, open: vec![], statements: vec![], suspect: None };
     let mut at = 0;
     while let Some(step) = scan.step(at, d) {
@@ -40,6 +41,12 @@ pub fn parse(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> File {
         let none =
             errors >= FIRST_ERRORS && blocks.open.is_empty() && !blocks.statements.iter().any(read);
         if errors >= MOST_ERRORS || none {
+            // One statement may hold many.
+            let wrong = |(_, d): &(usize, &Diagnostic)| d.severity == Severity::Error;
+            let kept = d.iter().enumerate().skip(first).filter(wrong).nth(MOST_ERRORS);
+            if let Some((more, _)) = kept {
+                d.truncate(more);
+            }
             let note =
                 Diagnostic::note("N0101", Span::NONE, "the rest of the file is not looked at");
             d.push(match none {

@@ -499,6 +499,7 @@ fn indexed_names() {
     }
     errors("param x = e(a + 1 -> b)", &["E0111 a + 1"]);
     errors("param x = sqrt(a -> b)", &["E0111 ->"]);
+    errors("param x = clamp(lo = 1, hi = 2, x = 3)", &["E0111 lo = 1"]);
 }
 
 #[test]
