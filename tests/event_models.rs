@@ -76,22 +76,27 @@ fn worst(trace: &Trace, name: &str, exact: &[f64]) -> f64 {
     worst.0
 }
 
-type Matrix = [[f64; 3]; 3];
+type Matrix<const N: usize> = [[f64; N]; N];
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+fn product<const N: usize>(a: &Matrix<N>, b: &Matrix<N>) -> Matrix<N> {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..N).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn applied<const N: usize>(a: &Matrix<N>, x: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| (0..N).map(|k| a[i][k] * x[k]).sum())
 }
 
 /// e^A by scaling and a Taylor series.
-fn exponential(a: &Matrix) -> Matrix {
+fn exponential<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     const HALVINGS: i32 = 12;
-    let scaled: Matrix = a.map(|row| row.map(|v| v * 0.5f64.powi(HALVINGS)));
-    let one: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    let scaled = a.map(|row| row.map(|v| v * 0.5f64.powi(HALVINGS)));
+    let one: Matrix<N> =
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     let (mut sum, mut term) = (one, one);
     for k in 1..12 {
         term = product(&term, &scaled).map(|row| row.map(|v| v / f64::from(k)));
-        for i in 0..3 {
-            for j in 0..3 {
+        for i in 0..N {
+            for j in 0..N {
                 sum[i][j] += term[i][j];
             }
         }
@@ -108,7 +113,7 @@ fn the_buck_converter_moves_as_matrix_exponentials_say() {
     let (l, rl, c, resr, rload): (f64, f64, f64, f64, f64) = (1e-4, 0.05, 47e-6, 0.02, 3.0);
     // State (i, vc, 1); vo = (vc + Resr·i)/(1 + Resr/Rload).
     let share = 1.0 / (1.0 + resr / rload);
-    let matrix = |on: bool, t: f64| -> Matrix {
+    let matrix = |on: bool, t: f64| -> Matrix<3> {
         let d = if on { 1.0 } else { 0.0 };
         let rows = [
             [-(rl + resr * share) / l, -share / l, d * vin / l],
@@ -118,8 +123,7 @@ fn the_buck_converter_moves_as_matrix_exponentials_say() {
         rows.map(|row| row.map(|v| v * t))
     };
     let move_on = |state: [f64; 3], on: bool, t: f64| -> [f64; 3] {
-        let e = exponential(&matrix(on, t));
-        std::array::from_fn(|i| (0..3).map(|k| e[i][k] * state[k]).sum())
+        applied(&exponential(&matrix(on, t)), &state)
     };
     let (trace, statistics) = circuit("buck_pwm");
     let times = trace.time().to_vec();
@@ -234,6 +238,58 @@ fn the_end_stop_is_met_and_left_as_piece_by_piece() {
     println!("{} impacts, their times off by {off:.1e} s", found.len());
     assert!(off <= 1e-6, "{off:e}");
     assert_eq!(statistics.slides, 0, "{statistics}");
+}
+
+#[test]
+fn the_sampled_controller_moves_as_matrix_exponentials_say() {
+    let (u_most, l, r, phi): (f64, f64, f64, f64) = (24.0, 2e-3, 1.5, 0.06);
+    let (j, b, ts, kp, kd): (f64, f64, f64, f64, f64) = (1e-4, 2e-5, 4e-3, 12.0, 0.2);
+    let dth = 2.0 * std::f64::consts::PI / 500.0;
+    // State (i, w, theta, u), u constant between readings.
+    let move_on = |state: [f64; 4], t: f64| {
+        let rows: Matrix<4> = [
+            [-r / l, -phi / l, 0.0, 1.0 / l],
+            [phi / j, -b / j, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0; 4],
+        ];
+        applied(&exponential(&rows.map(|row| row.map(|v| v * t))), &state)
+    };
+    // Where each reading finds the encoder: the distance to the next step says that no error of a route moves it on.
+    let (mut state, mut y, mut margin) = ([0.0; 4], 0.0, f64::MAX);
+    let mut read = |state: &mut [f64; 4], y: &mut f64, k: u32| {
+        let steps = state[2] / dth + 0.5;
+        margin = margin.min((steps - steps.round()).abs());
+        *y = dth * steps.floor();
+        let reference = if f64::from(k) * ts >= 18e-3 { 2.0 } else { 0.0 };
+        state[3] = (kp * (reference - *y) - kd * state[1]).clamp(-u_most, u_most);
+    };
+    read(&mut state, &mut y, 0);
+    let (trace, statistics) = circuit("sampled_controller");
+    let times = trace.time().to_vec();
+    let mut exact: [Vec<f64>; 5] = Default::default();
+    let mut k = 0;
+    for t in &times {
+        // What is read at the end is no longer seen.
+        while f64::from(k + 1) * ts <= t.min(0.5 - 1e-9) + 1e-12 {
+            state = move_on(state, ts);
+            k += 1;
+            read(&mut state, &mut y, k);
+        }
+        let [i, w, theta, u] = move_on(state, t - f64::from(k) * ts);
+        let row = [theta, y, u, i, w];
+        exact.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+    }
+    println!("the nearest to a step of the encoder: {margin:.1e} of it");
+    assert!(margin > 5e-3, "{margin:e}");
+    let (own, own_statistics) = own_equations("sampled_controller", &times);
+    for (name, exact) in ["theta", "y", "u", "i", "w"].iter().zip(&exact) {
+        assert!(worst(&trace, name, exact) <= 1e-6, "{name}: {statistics}");
+        assert!(worst(&own, name, exact) <= 1e-8, "{name}: {own_statistics:?}");
+    }
+    // It does hunt: the encoder goes on stepping at the end.
+    let last: Vec<f64> = exact[1][900..].to_vec();
+    assert!(last.windows(2).any(|pair| pair[0] < pair[1]), "{last:?}");
 }
 
 #[test]

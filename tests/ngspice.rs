@@ -142,7 +142,8 @@ fn the_actuator_on_a_step() {
 }
 
 /// Models whose laws jump.
-const EVENTS: [&str; 3] = ["buck_pwm.bg", "end_stop.bg", "mass_between_stops.bg"];
+const EVENTS: [&str; 4] =
+    ["buck_pwm.bg", "end_stop.bg", "mass_between_stops.bg", "sampled_controller.bg"];
 
 #[test]
 fn every_model_gives_what_its_own_equations_give() {

@@ -19,6 +19,7 @@ pub const EXAMPLES: &[(&str, &str)] = examples! {
     "buck_pwm.bg"
     "end_stop.bg"
     "stick_slip.bg"
+    "sampled_controller.bg"
     "coupled_coils.bg"
     "plate_transducer.bg"
     "solenoid.bg"
