@@ -10,6 +10,7 @@
 use crate::expr;
 use crate::quantity::Domain;
 use crate::source::Span;
+use std::collections::HashMap;
 
 macro_rules! index {
     ($(#[$doc:meta] $name:ident)*) => { $(
@@ -399,6 +400,10 @@ pub struct BondGraph {
     pub vertices: Vec<Vertex>,
     /// Bonds, in file order.
     pub bonds: Vec<Bond>,
+    /// Ports of instances by name, in file order, and their bonds, whose half arrows point as the model declares it.
+    pub ports: Vec<(String, BondId)>,
+    /// Instances that the file itself declares: by name, where.
+    pub instances: HashMap<String, Span>,
     /// What regulates what, in file order.
     pub regulators: Vec<Regulator>,
     /// What a plain run does.
@@ -432,6 +437,12 @@ impl BondGraph {
     /// The bond of an index.
     pub fn bond(&self, id: BondId) -> &Bond {
         &self.bonds[id.index()]
+    }
+
+    /// Where the file declares the instance that an element is a part of, however deep in it; `None` for the file's own.
+    pub fn instance_of(&self, id: VertexId) -> Option<(&str, Span)> {
+        let (instance, _) = self.vertex(id).name.split_once('.')?;
+        self.instances.get(instance).map(|span| (instance, *span))
     }
 
     /// All vertex indices.

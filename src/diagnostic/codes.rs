@@ -95,6 +95,7 @@ pub const CODES: &[Code] = &[
     row("E0252", "file of a table cannot be read", "A table's file has two columns of numbers in SI, separated by commas (or semicolons, or blanks). A first line without numbers is a header; a unit in square brackets in it holds for its column. Lines that begin with `#` are skipped."),
     row("W0201", "input is not driven", "The input is taken as 0. `drive NAME = …` says what it gets; a simulation needs it."),
     row("W0202", "own variable hides a name", "In the laws of a field q1, p2, e1, f2 and so on are its own variables. A parameter or signal of the same name cannot be meant there; give it another name."),
+    row("W0203", "nothing reads a signal", "The file says what is observed, and neither that nor a law, another signal, a regulator or an `output` speaks of this signal: it has no effect. A file without `observe` shows all its signals."),
     // -- 03: units and domains
     row("E0301", "unknown unit", "A name right after a number, with at most one blank between, is its unit. Known are the units of the SI with its prefixes and bar, psi, L, min, h, rpm, rev, deg, inch, g, Ohm, degC and %; a product needs a `*`."),
     row("E0302", "malformed unit", "A unit is a product of powers of unit names without blanks, as `m^3/(s*Pa)`. Exponents are rational and of moderate size."),

@@ -71,6 +71,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0252" "table_file_torn.bg"
     "W0201" "input_taken_as_0.bg"
     "W0202" "field_hidden_name.bg"
+    "W0203" "signal_unread.bg"
     "E0301" "unknown_unit.bg"
     "E0302" "unit_of_great_powers.bg"
     "E0303" "end_in_metres.bg"

@@ -31,6 +31,8 @@ pub struct Label {
     pub span: Span,
     /// What is said of it; may be empty.
     pub text: String,
+    /// Whether it is a place where the others are used, an instance: repeats that differ there alone are one.
+    pub of_use: bool,
 }
 
 /// A change of text that mends the trouble for certain.
@@ -84,7 +86,7 @@ impl Diagnostic {
         message: impl Into<String>,
     ) -> Diagnostic {
         let labels =
-            if span.is_none() { vec![] } else { vec![Label { span, text: String::new() }] };
+            if span.is_none() { vec![] } else { vec![Label { span, text: String::new(), of_use: false }] };
         Diagnostic {
             code,
             severity,
@@ -107,7 +109,15 @@ impl Diagnostic {
     /// Adds a place.
     pub fn label(mut self, span: Span, text: impl Into<String>) -> Diagnostic {
         if !span.is_none() {
-            self.labels.push(Label { span, text: text.into() });
+            self.labels.push(Label { span, text: text.into(), of_use: false });
+        }
+        self
+    }
+
+    /// Adds a place where what the others point at is used.
+    pub fn used(mut self, span: Span, text: impl Into<String>) -> Diagnostic {
+        if !span.is_none() {
+            self.labels.push(Label { span, text: text.into(), of_use: true });
         }
         self
     }
@@ -136,7 +146,8 @@ pub fn merge_repeats(diagnostics: &mut Vec<Diagnostic>, first: usize) {
     let mut known: HashMap<(&'static str, Vec<Span>), usize> = HashMap::new();
     let mut kept: Vec<(Diagnostic, usize, String)> = vec![];
     for diagnostic in diagnostics.drain(first..) {
-        let spans: Vec<Span> = diagnostic.labels.iter().map(|label| label.span).collect();
+        let labels = diagnostic.labels.iter().filter(|label| !label.of_use);
+        let spans: Vec<Span> = labels.map(|label| label.span).collect();
         let same = match spans.is_empty() {
             true => None,
             false => match known.entry((diagnostic.code, spans)) {

@@ -13,6 +13,8 @@ const LONG_CHAIN: usize = 32;
 pub(super) struct Part<L> {
     pub(super) expr: Expr<L>,
     pub(super) depth: usize,
+    /// Where it stands, with the brackets around it.
+    pub(super) place: Span,
 }
 
 pub(super) enum Operator {
@@ -68,7 +70,7 @@ const NOT: u8 = 3;
 const SIGN: u8 = 7;
 
 pub(super) fn measured<L>(expr: Expr<L>) -> Part<L> {
-    Part { depth: expr.depth(), expr }
+    Part { depth: expr.depth(), place: expr.span, expr }
 }
 
 /// A node over parts, unless it gets too deep.
@@ -82,7 +84,7 @@ pub(super) fn join<L>(
         d.push(too_deep(span));
         return None;
     }
-    Some(Part { expr: Expr::new(node, span), depth: depth + 1 })
+    Some(Part { expr: Expr::new(node, span), depth: depth + 1, place: span })
 }
 
 impl<L> Stack<'_, L> {
@@ -148,12 +150,13 @@ impl<L> Stack<'_, L> {
 
     fn prefix(&mut self, operator: Operator, operand: Part<L>) -> Option<Part<L>> {
         let (unary, span) = match operator {
-            Operator::Negate(span) => (Unary::Negate, span.join(operand.expr.span)),
-            Operator::Not(span) => (Unary::Not, span.join(operand.expr.span)),
+            Operator::Negate(span) => (Unary::Negate, span.join(operand.place)),
+            Operator::Not(span) => (Unary::Not, span.join(operand.place)),
             _ => return Some(operand),
         };
         if let (Unary::Negate, Some(value)) = (unary, operand.expr.as_number()) {
-            return Some(Part { expr: Expr::new(Node::Number(-value), span), depth: 1 });
+            let expr = Expr::new(Node::Number(-value), span);
+            return Some(Part { expr, depth: 1, place: span });
         }
         join(Node::Unary(unary, operand.expr), operand.depth, span, self.diagnostics)
     }
@@ -209,7 +212,7 @@ impl<L> Stack<'_, L> {
     }
 
     fn operation(&mut self, op: Binary, left: Part<L>, right: Part<L>) -> Option<Part<L>> {
-        let span = left.expr.span.join(right.expr.span);
+        let span = left.place.join(right.place);
         let depth = left.depth.max(right.depth);
         let node = if op == Binary::Power && self.dialect == Dialect::Ngspice {
             Node::Call(Function::PowerOfAbs, vec![left.expr, right.expr])

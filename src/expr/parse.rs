@@ -184,7 +184,13 @@ pub fn expression<L: Language>(
     pair: Pair<'_, L::Rule>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Expr<L::Leaf>> {
-    convert(language, pair, d).map(|part| part.expr)
+    convert(language, pair, d).map(|mut part| {
+        // A number or a name in brackets keeps its own place.
+        if !matches!(*part.expr.node, Node::Number(_) | Node::Leaf(_)) {
+            part.expr.span = part.place;
+        }
+        part.expr
+    })
 }
 
 fn convert<L: Language>(
@@ -213,7 +219,14 @@ fn convert<L: Language>(
             Role::Not => stack.operators.push(Operator::Not(span)),
             _ => {
                 let operand = match role {
-                    Role::Expression => convert(language, part, stack.diagnostics),
+                    Role::Expression => {
+                        let place = bracketed(part.as_span()).map(|span| language.span(span));
+                        let mut operand = convert(language, part, stack.diagnostics);
+                        if let (Some(operand), Some(place)) = (&mut operand, place) {
+                            operand.place = place;
+                        }
+                        operand
+                    }
                     Role::Conditional => conditional(language, part, stack.diagnostics),
                     Role::Call => call(language, part, stack.diagnostics),
                     _ => language.atom(part, stack.diagnostics).map(measured),
@@ -236,6 +249,14 @@ fn convert<L: Language>(
         _ => value,
     };
     value.filter(|_| !failed)
+}
+
+/// The place of an expression with the brackets around it, which are no pairs of the grammar.
+fn bracketed(inner: pest::Span<'_>) -> Option<pest::Span<'_>> {
+    let input = inner.get_input();
+    let before = input.get(..inner.start())?.trim_end().strip_suffix('(')?;
+    let behind = input.get(inner.end()..)?.trim_start().strip_prefix(')')?;
+    pest::Span::new(input, before.len(), input.len() - behind.len())
 }
 
 fn choice<L>(
@@ -325,7 +346,7 @@ fn call<L: Language>(
             let copies: Vec<_> = arguments.into_iter().map(|a| a.expr).collect();
             let mut expr = substitute(&template, &copies);
             expr.span = span;
-            Some(Part { expr, depth })
+            Some(Part { expr, depth, place: span })
         }
     }
 }

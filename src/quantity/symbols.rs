@@ -179,7 +179,11 @@ pub(super) fn nearest_unit(name: &str) -> Option<String> {
     if name.chars().count() <= 2 {
         // Nearly every pair of letters is near some unit; only a slip of case says anything.
         let same = |candidate: &str| candidate.to_lowercase() == name.to_lowercase();
-        return all_names().find(|candidate| same(candidate));
+        // `mh` is `mH` rather than `MH`.
+        let changes = |candidate: &String| {
+            candidate.chars().zip(name.chars()).filter(|(one, other)| one != other).count()
+        };
+        return all_names().filter(|candidate| same(candidate)).min_by_key(changes);
     }
     // A plural, `Ohms`, before two units run together, `Ohm*s`.
     if let Some(one) =

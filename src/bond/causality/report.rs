@@ -271,6 +271,8 @@ fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependen
     for end in on {
         diagnostic = diagnostic.label(graph.vertex(end.vertex).span, "");
     }
+    let concerned = std::iter::once(dependent.storage.vertex).chain(on.iter().map(|e| e.vertex));
+    diagnostic = at_instances(graph, diagnostic, concerned);
     let (states, storages) =
         (causality.states.len(), causality.states.len() + causality.dependent.len());
     let are = if states == 1 { "is a state" } else { "are states" };
@@ -282,6 +284,22 @@ fn tell_dependent(graph: &BondGraph, causality: &Causality, dependent: &Dependen
     diagnostic
         .because(count)
         .help("the result is right as it stands; a stiff C or a small R between them would make it a state of its own")
+}
+
+/// Points at the instances in the file that elements are parts of: the lines of a library say nothing of its use.
+fn at_instances(
+    graph: &BondGraph,
+    mut diagnostic: Diagnostic,
+    concerned: impl Iterator<Item = VertexId>,
+) -> Diagnostic {
+    let mut said = vec![];
+    for (instance, span) in concerned.filter_map(|id| graph.instance_of(id)) {
+        if !said.contains(&instance) {
+            said.push(instance);
+            diagnostic = diagnostic.used(span, format!("in `{instance}`, used here"));
+        }
+    }
+    diagnostic
 }
 
 fn tell_loop(graph: &BondGraph, found: &AlgebraicLoop) -> Diagnostic {
@@ -316,6 +334,8 @@ fn tell_loop(graph: &BondGraph, found: &AlgebraicLoop) -> Diagnostic {
     for &span in spans.iter().skip(1) {
         diagnostic = diagnostic.label(span, "");
     }
+    let concerned = found.elements.iter().take(MOST).copied();
+    diagnostic = at_instances(graph, diagnostic, concerned);
     diagnostic.because(format!("causal path: {}", path(graph, &found.path))).because(
         "no storage stands between them: the solver finds their values together at each instant",
     )

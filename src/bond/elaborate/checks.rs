@@ -249,18 +249,38 @@ impl<'a> Scope<'a> {
             let Some(needed) = needed.filter(|needed| *needed != dimension) else { continue };
             // One mistake in an element gives one error.
             if !std::mem::replace(&mut failed, true) && clashes.len() == before {
-                clashes.push(self.misfit(id, stated, (dimension, needed), told));
+                let at_home = stated.label.is_some()
+                    && found.iter().any(|other| self.fits(id, other, stated, told.domain));
+                clashes.push(self.misfit(id, stated, (dimension, needed), told, at_home));
             }
         }
     }
 
-    /// The error for a value that does not fit its bond.
+    /// Whether what an element states beside one value is of the domain of that one's bond.
+    fn fits(
+        &mut self,
+        id: VertexId,
+        other: &Stated<'a>,
+        one: &Stated<'a>,
+        domain: Domain,
+    ) -> bool {
+        if other.ports != one.ports || other.value.span() == one.value.span() {
+            return false;
+        }
+        let mut walk = Walk::new(self, Some(id));
+        let needed = other.clue.between(domain, domain);
+        let needed = if other.rate { needed.and_then(|n| n.over(SECOND)) } else { needed };
+        needed.is_some() && other.value.dimension(&mut walk).known() == needed
+    }
+
+    /// The error for a value that does not fit its bond. `at_home`: the element does, by what else it states.
     fn misfit(
         &mut self,
         id: VertexId,
         stated: &Stated<'a>,
         (dimension, needed): (Dimension, Dimension),
         told: Told,
+        at_home: bool,
     ) -> Clash {
         let expr = stated.value.expr();
         let side = Side::of(self, &expr, dimension);
@@ -272,7 +292,7 @@ impl<'a> Scope<'a> {
             Some(label) => format!("`{} = …` of the {noun} `{name}`", self.map.text(label)),
             None => format!("the value of the {noun} `{name}`"),
         };
-        let other = match stated.rate || stated.ports.0 != stated.ports.1 {
+        let other = match stated.rate || stated.ports.0 != stated.ports.1 || at_home {
             true => None,
             false => domains(stated.clue.fitting(dimension)).next(),
         };

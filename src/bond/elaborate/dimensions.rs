@@ -371,6 +371,8 @@ impl<'w, 'a> Walk<'w, 'a> {
         }
         let Some(row) = agreement(name) else { return Dim::Unknown };
         let mut given: Vec<(usize, &syntax::Expr)> = vec![];
+        // What the header of a table's file says of its columns.
+        let mut columns: Vec<(usize, &syntax::Expr, Dim)> = vec![];
         let mut powers: Vec<i8> = vec![];
         let whole = |argument: &'_ Argument| argument.label.is_none();
         match row.form {
@@ -400,6 +402,11 @@ impl<'w, 'a> Walk<'w, 'a> {
                 for (k, argument) in call.rows.iter().flatten().enumerate() {
                     match &argument.value {
                         Value::Expr(value) if k == 0 => given.push((0, value)),
+                        Value::Expr(points) => {
+                            let units = self.scope.columns_of_file(points).into_iter().flatten();
+                            let known = units.enumerate().filter_map(|(k, unit)| Some((k, unit?)));
+                            columns.extend(known.map(|(k, unit)| (k, points, Dim::Known(unit))));
+                        }
                         Value::Matrix(rows) => {
                             for points in rows {
                                 given.extend((0..).zip(points));
@@ -448,6 +455,7 @@ impl<'w, 'a> Walk<'w, 'a> {
             }
             found.push((at, value, dim));
         }
+        found.append(&mut columns);
         if row.form != Form::Plain {
             usual_first(&mut found);
         }

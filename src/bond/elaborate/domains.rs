@@ -102,10 +102,15 @@ impl Groups {
     }
 }
 
-/// What elements say of the domain of one group: the one that most say wins, of equals the likelier
-/// (which stands first in the table). `None` while only
-/// such domains are left that share what is known of them, unless it shall be guessed.
-pub(super) fn winner(votes: &[(VertexId, Mask)], guess: bool) -> Option<(Domain, VertexId)> {
+/// What elements say of the domain of one group: the one that most say wins. Where several are left, whether they share
+/// what is known of them or as many elements speak for each, these are the error (0 where nothing is said), so that a
+/// two-port can decide; unless it shall be guessed: then what all elements share goes to the likelier, which stands first
+/// in the table, and what they contend for to the element that stands first in the text (not to a magnetic one, which is
+/// mostly an electrical source of the wrong kind).
+pub(super) fn winner(
+    votes: &[(VertexId, Mask)],
+    guess: bool,
+) -> Result<(Domain, VertexId), Mask> {
     let mut tally = [0usize; DOMAINS.len()];
     let mut common = Mask::MAX;
     for (_, mask) in votes {
@@ -114,21 +119,29 @@ pub(super) fn winner(votes: &[(VertexId, Mask)], guess: bool) -> Option<(Domain,
         }
         common &= *mask;
     }
-    let most = tally.iter().copied().max().filter(|most| *most > 0)?;
+    let most = tally.iter().copied().max().filter(|most| *most > 0).ok_or(0 as Mask)?;
     let best: Mask = domains(Mask::MAX)
         .filter(|domain| tally[*domain as usize] == most)
         .map(bit)
         .fold(0, |all, one| all | one);
-    if common & best == best && best.count_ones() > 1 && !guess {
-        return None;
+    if best.count_ones() > 1 && !guess {
+        return Err(best);
     }
     let mut in_order: Vec<&(VertexId, Mask)> = votes.iter().collect();
     in_order.sort_unstable_by_key(|(id, _)| *id);
     // Who says it alone before who says it with others.
     let says = |domain| in_order.iter().find(|(_, mask)| *mask == bit(domain));
-    let domain = domains(best).next()?;
-    let by = says(domain).or_else(|| in_order.iter().find(|(_, mask)| mask & bit(domain) != 0))?;
-    Some((domain, by.0))
+    // A source of the wrong kind, a flow of volts or an effort of amperes, looks magnetic.
+    let sure = domains(best)
+        .filter_map(|domain| says(domain).map(|(id, _)| (domain == Domain::Magnetic, *id, domain)))
+        .min_by_key(|(magnetic, id, _)| (*magnetic, *id));
+    let shared = common & best == best;
+    let domain = match sure {
+        Some((.., domain)) if !shared => domain,
+        _ => domains(best).next().ok_or(best)?,
+    };
+    let by = says(domain).or_else(|| in_order.iter().find(|(_, mask)| mask & bit(domain) != 0));
+    by.map(|by| (domain, by.0)).ok_or(best)
 }
 
 /// The effort and the flow on the other side of a two-port. `first`: the known one is at port 1.
@@ -246,17 +259,24 @@ mod tests {
         let (electrical, rotation) = (bit(Domain::Electrical), bit(Domain::Rotation));
         let kelvin = bit(Domain::Thermal) | bit(Domain::PseudoThermal);
         let watt = bit(Domain::PseudoThermal);
-        assert_eq!(winner(&[], true), None);
-        assert_eq!(winner(&[(u, electrical)], false), Some((Domain::Electrical, u)));
+        assert_eq!(winner(&[], true), Err(0));
+        assert_eq!(winner(&[(u, electrical)], false), Ok((Domain::Electrical, u)));
         // The one that most say, whatever their order.
         let votes = [(c, rotation), (u, electrical), (r, electrical)];
-        assert_eq!(winner(&votes, false), Some((Domain::Electrical, u)));
-        // Of two the likelier.
-        assert_eq!(winner(&[(r, rotation), (u, electrical)], false), Some((Domain::Electrical, u)));
+        assert_eq!(winner(&votes, false), Ok((Domain::Electrical, u)));
+        // Of two that contend for it the first in the text, if nothing else decides.
+        let tie = [(r, electrical), (u, rotation)];
+        assert_eq!(winner(&tie, false), Err(electrical | rotation));
+        assert_eq!(winner(&tie, true), Ok((Domain::Rotation, u)));
+        let kinds = [(u, bit(Domain::Magnetic)), (r, electrical)];
+        assert_eq!(winner(&kinds, true), Ok((Domain::Electrical, r)));
         // What two domains share waits for what one has alone.
-        assert_eq!(winner(&[(u, kelvin)], false), None);
-        assert_eq!(winner(&[(u, kelvin)], true), Some((Domain::Thermal, u)));
-        assert_eq!(winner(&[(u, kelvin), (r, watt)], false), Some((Domain::PseudoThermal, r)));
+        assert_eq!(winner(&[(u, kelvin)], false), Err(kelvin));
+        assert_eq!(winner(&[(u, kelvin)], true), Ok((Domain::Thermal, u)));
+        assert_eq!(winner(&[(u, kelvin), (r, watt)], false), Ok((Domain::PseudoThermal, r)));
+        let heat = [(u, kelvin), (r, watt), (c, bit(Domain::Thermal))];
+        assert_eq!(winner(&heat, false), Err(kelvin));
+        assert_eq!(winner(&heat, true), Ok((Domain::PseudoThermal, r)));
     }
 
     #[test]

@@ -30,6 +30,60 @@ impl<'a> Scope<'a> {
         set: &'a [(String, String, Option<Syntax>)],
         d: &mut Vec<Diagnostic>,
     ) -> Scope<'a> {
+        let mut scope = Scope::of_bodies(program, map, set, d);
+        scope.expand_frames(0, d);
+        scope.here = Here::ROOT;
+        scope
+    }
+
+    /// Collects what stands in the models of the first file that no instance is made of, as far as that is known
+    /// without one: each gets a frame of its own, in which parameters without defaults and inputs have no values.
+    /// `None` when every model is used.
+    pub fn collect_unused(
+        program: &'a Program,
+        map: &'a SourceMap,
+        used: &Scope<'_>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Scope<'a>> {
+        let mut seen = vec![false; used.bodies.len()];
+        used.frames.iter().for_each(|frame| seen[frame.body] = true);
+        let own = |k: usize| used.bodies[k].file == 0 && used.bodies[k].header.is_some();
+        if (0..seen.len()).all(|k| seen[k] || !own(k)) {
+            return None;
+        }
+        // What is wrong with the names of models has been said.
+        let mut scope = Scope::of_bodies(program, map, &[], &mut vec![]);
+        // Those that stand last use those before them, and then show these in their place.
+        for body in (0..seen.len()).rev() {
+            if seen[body] || !own(body) {
+                continue;
+            }
+            let first = scope.frames.len();
+            scope.frames.push(frame(body, String::new(), None, Span::NONE, &[]));
+            scope.expand_frames(first, d);
+            scope.frames[first..].iter().for_each(|frame| seen[frame.body] = true);
+        }
+        scope.here = Here::ROOT;
+        Some(scope)
+    }
+
+    /// Works through the frames from one on, and through those that they declare.
+    fn expand_frames(&mut self, first: usize, d: &mut Vec<Diagnostic>) {
+        let mut next = first;
+        while next < self.frames.len() {
+            self.here = Here { frame: FrameId(next as u32), round: None };
+            self.expand_frame(d);
+            next += 1;
+        }
+    }
+
+    /// A scope that knows the models of a program, and the frame of its first file, still empty.
+    fn of_bodies(
+        program: &'a Program,
+        map: &'a SourceMap,
+        set: &'a [(String, String, Option<Syntax>)],
+        d: &mut Vec<Diagnostic>,
+    ) -> Scope<'a> {
         let setting = |(name, text, value): &'a (String, String, Option<Syntax>)| Setting {
             name,
             text,
@@ -62,6 +116,7 @@ impl<'a> Scope<'a> {
             set: set.iter().map(setting).collect(),
             hidden: HashMap::new(),
             tables: HashMap::new(),
+            table_units: HashMap::new(),
             marks: vec![],
             evaluated: vec![],
             demands: 0,
@@ -73,13 +128,6 @@ impl<'a> Scope<'a> {
         scope.collect_bodies(program, d);
         scope.graph.name = scope.bodies.first().map_or(String::new(), |body| body.name.clone());
         scope.frames.push(frame(0, String::new(), None, Span::NONE, &[]));
-        let mut next = 0;
-        while next < scope.frames.len() {
-            scope.here = Here { frame: FrameId(next as u32), round: None };
-            scope.expand_frame(d);
-            next += 1;
-        }
-        scope.here = Here::ROOT;
         scope
     }
 
@@ -217,6 +265,8 @@ impl<'a> Scope<'a> {
             let value = match (take(&name.text, &mut used), &parameter.default) {
                 (Some(value), _) => outer.map(|here| (value, here)),
                 (None, Some(default)) => Some((default, self.here)),
+                // A model that is looked at without an instance.
+                (None, None) if outer.is_none() => None,
                 (None, None) => {
                     d.push(
                         Diagnostic::error(
@@ -234,7 +284,8 @@ impl<'a> Scope<'a> {
                     None
                 }
             };
-            self.declare_parameter(Cow::Borrowed(&name.text), name.span, value, "", d);
+            let description = parameter.description.as_ref().map_or("", |text| text.text.as_str());
+            self.declare_parameter(Cow::Borrowed(&name.text), name.span, value, description, d);
             self.frame_mut().public.insert(Cow::Borrowed(&name.text));
         }
         for statement in statements {
@@ -369,9 +420,12 @@ impl<'a> Scope<'a> {
                     self.expand_loop(variable, range, body, inputs, item.span, d);
                 }
                 StatementKind::If { condition, then, otherwise } => {
-                    if let Some(value) = self.number(condition, "a condition", d) {
-                        let body = if value != 0.0 { then } else { otherwise };
-                        self.expand(body, inputs, false, d);
+                    match self.number(condition, "a condition", d) {
+                        Some(value) => {
+                            let body = if value != 0.0 { then } else { otherwise };
+                            self.expand(body, inputs, false, d);
+                        }
+                        None => self.excuse(item.span),
                     }
                 }
                 StatementKind::Loop(regulator) => self.regulators.push((regulator, here)),
@@ -409,12 +463,7 @@ impl<'a> Scope<'a> {
                         .help("write it outside the braces"),
                     );
                 }
-                StatementKind::Unreadable => {
-                    let text = self.map.text(item.span);
-                    let parts = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
-                    let parts = parts.filter(|part| !part.is_empty());
-                    self.frame_mut().excused.extend(parts);
-                }
+                StatementKind::Unreadable => self.excuse(item.span),
             }
         }
     }
@@ -446,6 +495,12 @@ impl<'a> Scope<'a> {
         true
     }
 
+    /// What a text that was not carried out would have made is not missing for another reason.
+    fn excuse(&mut self, span: Span) {
+        let parts = self.map.text(span).split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        self.frame_mut().excused.extend(parts.filter(|part| !part.is_empty()));
+    }
+
     fn expand_loop(
         &mut self,
         variable: &'a Name,
@@ -458,11 +513,7 @@ impl<'a> Scope<'a> {
         let from = self.integer(&range.0, "a bound of a loop", d);
         let to = self.integer(&range.1, "a bound of a loop", d);
         let (Some(from), Some(to)) = (from, to) else {
-            // What the loop would have made is not missing for another reason.
-            let text = self.map.text(span);
-            let parts = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
-            self.frame_mut().excused.extend(parts.filter(|part| !part.is_empty()));
-            return;
+            return self.excuse(span);
         };
         let before = self.here;
         let name: std::rc::Rc<str> = variable.text.as_str().into();
@@ -646,6 +697,9 @@ impl<'a> Scope<'a> {
         }
         let id = FrameId(self.frames.len() as u32);
         let arguments = end.arguments.as_deref().unwrap_or(&[]);
+        if self.here.frame == Here::ROOT.frame {
+            self.graph.instances.insert(full.clone(), end.span);
+        }
         self.frame_mut().things.insert(key, Thing::Instance(id));
         let prefix = format!("{full}.");
         self.frames.push(frame(body, prefix, Some(self.here), end.span, arguments));
@@ -701,7 +755,10 @@ impl<'a> Scope<'a> {
         if !self.made_anew(name, d) {
             return;
         }
-        let Some(key) = self.full_key(name, d) else { return };
+        let Some(key) = self.full_key(name, d) else {
+            self.frame_mut().excused.insert(&name.text);
+            return;
+        };
         let id = SignalId(self.graph.signals.len() as u32);
         let full = format!("{}{key}", self.frame().prefix);
         if !self.declare_value(key, name.span, Meaning::Signal(id), d) {

@@ -4,7 +4,8 @@
 //! and is looked at again when one of them is found; so no order of statements matters, no chain is too long, and the
 //! work grows with what there is. Elements that know their units tell the domain of their group of bonds (`domains`);
 //! what is known on one side of a two-port tells the other side by its ratio. Only when nothing follows any more, what
-//! two domains share is taken for the likelier one: kelvins alone are thermal, beside watts pseudo-thermal.
+//! two domains share is taken for the likelier one: kelvins alone are thermal, beside watts pseudo-thermal; and where
+//! as many elements speak for one domain as for another, the first of them in the text is believed.
 
 use super::dimensions::{Dim, Open, Walk};
 use super::domains::{By, Groups, Told, across, domain_of, winner};
@@ -135,8 +136,10 @@ struct Inference<'i, 'a> {
     half_known: Vec<VertexId>,
     /// Groups of which something new was said.
     fresh: Vec<u32>,
-    /// Groups that wait for a guess.
-    doubtful: Vec<u32>,
+    /// Groups that wait for a two-port or a guess.
+    doubtful: VecDeque<u32>,
+    /// By group: the domains that what elements say has left.
+    left: Vec<Mask>,
     /// By group: the two-ports at it.
     touching: Lists<VertexId>,
     two_ports: VecDeque<VertexId>,
@@ -166,7 +169,8 @@ impl<'a> Scope<'a> {
             voted: vec![false; vertices],
             half_known: vec![],
             fresh: vec![],
-            doubtful: vec![],
+            doubtful: VecDeque::new(),
+            left: vec![Mask::MAX; groups],
             touching: Lists::new(groups),
             two_ports: VecDeque::new(),
             buffer: vec![],
@@ -246,7 +250,7 @@ impl Inference<'_, '_> {
                 self.queued[index] = false;
                 self.look_at(task);
             }
-            if self.settle_groups(false) {
+            if self.settle_groups() {
                 continue;
             }
             if let Some(id) = self.two_ports.pop_front() {
@@ -256,7 +260,7 @@ impl Inference<'_, '_> {
             for id in std::mem::take(&mut self.half_known) {
                 self.ask(id, true);
             }
-            if !self.settle_groups(false) && !self.settle_groups(true) {
+            if !self.settle_groups() && !self.guess() {
                 return;
             }
         }
@@ -417,23 +421,46 @@ impl Inference<'_, '_> {
     }
 
     /// Settles the groups of which something new was said. Whether any was.
-    fn settle_groups(&mut self, guess: bool) -> bool {
-        let groups = std::mem::take(if guess { &mut self.doubtful } else { &mut self.fresh });
+    fn settle_groups(&mut self) -> bool {
+        let mut groups = std::mem::take(&mut self.fresh);
+        groups.sort_unstable();
+        groups.dedup();
         let mut any = false;
         for group in groups {
-            if self.scope.units.groups.told[group as usize].is_some() {
-                continue;
-            }
-            let votes: Vec<(VertexId, Mask)> = self.votes.get(group as usize).collect();
-            match winner(&votes, guess) {
-                Some((domain, by)) => {
-                    self.settle(group, Told { domain, by: By::Element(by) });
-                    any = true;
-                }
-                None => self.doubtful.push(group),
-            }
+            any |= self.settle_by_votes(group, false);
         }
         any
+    }
+
+    /// Guesses for one doubtful group: what it tells may decide the others. Whether there was one.
+    fn guess(&mut self) -> bool {
+        while let Some(group) = self.doubtful.pop_front() {
+            if self.settle_by_votes(group, true) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Settles a group by what elements say of it. Whether it could.
+    fn settle_by_votes(&mut self, group: u32, guess: bool) -> bool {
+        if self.scope.units.groups.told[group as usize].is_some() {
+            return false;
+        }
+        let votes: Vec<(VertexId, Mask)> = self.votes.get(group as usize).collect();
+        match winner(&votes, guess) {
+            Ok((domain, by)) => {
+                self.settle(group, Told { domain, by: By::Element(by) });
+                true
+            }
+            Err(left) => {
+                self.left[group as usize] = left;
+                if !guess {
+                    self.doubtful.push_back(group);
+                }
+                false
+            }
+        }
     }
 
     fn settle(&mut self, group: u32, told: Told) {
@@ -484,9 +511,13 @@ impl Inference<'_, '_> {
             return;
         };
         // What is wrong is said where two-ports are checked.
-        let allowed = self.votes.get(to as usize).fold(Mask::MAX, |all, (_, mask)| all & mask);
-        if domain.row().pseudo == told.domain.row().pseudo && allowed & bit(domain) != 0 {
-            self.settle(to, Told { domain, by: By::Across(id, from) });
+        if domain.row().pseudo == told.domain.row().pseudo
+            && self.left[to as usize] & bit(domain) != 0
+        {
+            // An element that says the same stands nearer.
+            let says = self.votes.get(to as usize).filter(|(_, mask)| *mask == bit(domain));
+            let by = says.map(|(id, _)| id).min().map_or(By::Across(id, from), By::Element);
+            self.settle(to, Told { domain, by });
         }
     }
 }

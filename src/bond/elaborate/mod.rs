@@ -35,6 +35,10 @@ mod observe;
 mod tests;
 #[cfg(test)]
 mod units_tests;
+#[cfg(test)]
+mod hints_tests;
+#[cfg(test)]
+mod unused_tests;
 
 pub use expand::MOST_PARTS;
 pub use experiment::require_drives;
@@ -71,6 +75,27 @@ pub fn forms() -> impl Iterator<Item = (&'static str, String)> {
     functions::CALLS.iter().map(|row| (row.name, row.form()))
 }
 
+/// Checks the models of a file that no instance is made of, as far as their bodies can be without one: parameters
+/// without defaults have no values, and what depends on them is not looked at.
+fn check_unused(
+    program: &Program,
+    map: &SourceMap,
+    used: &scope::Scope<'_>,
+    d: &mut Vec<Diagnostic>,
+) {
+    let mut found = vec![];
+    let Some(mut scope) = scope::Scope::collect_unused(program, map, used, &mut found) else {
+        return;
+    };
+    scope.join_bonds(&mut found);
+    scope.evaluate_parameters(&mut found);
+    scope.make_laws(&mut found);
+    scope.make_signals(&[], &mut found);
+    // Nothing drives its inputs, and all such models together may be more than one graph may hold.
+    found.retain(|said| !matches!(said.code, "W0201" | "E0237"));
+    d.extend(found);
+}
+
 /// Makes the graph of a program: its first file, and what that imports. `None` when anything was wrong; errors in `d`
 /// of an earlier stage count too, since a statement that could not be read leaves a hole.
 pub fn elaborate(
@@ -98,7 +123,11 @@ pub fn elaborate(
     scope.set_observed(overrides.observe.as_deref(), d);
     if !has_errors(&d[before..]) {
         crate::bond::fields::check(&scope.graph, d);
+        if overrides.observe.is_none() && program.observes() {
+            scope.warn_of_unread(d);
+        }
     }
+    check_unused(program, map, &scope, d);
     merge_repeats(d, before);
     (!has_errors(d)).then_some(scope.graph)
 }

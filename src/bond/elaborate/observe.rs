@@ -2,7 +2,7 @@
 
 use super::dimensions::Dim;
 use super::experiment::{is_name, si_text};
-use super::frames::Here;
+use super::frames::{FrameId, Here};
 use super::reading::variable;
 use super::scope::{Meaning, Scope};
 use super::value::Place;
@@ -38,6 +38,59 @@ impl Scope<'_> {
             true => self.columns_of_any(),
             false => columns,
         };
+    }
+
+    /// Warns of signals of the file that nothing reads: no law, no other signal, no regulator, no output, no column. What
+    /// models keep to themselves may be there to be looked at.
+    pub fn warn_of_unread(&self, d: &mut Vec<Diagnostic>) {
+        let graph = &self.graph;
+        let mut read = vec![false; graph.signals.len()];
+        let mut note = |expr: &Expr| {
+            expr.leaves(&mut |leaf, _| {
+                if let Leaf::Signal(id) = leaf {
+                    read[id.index()] = true;
+                }
+            });
+        };
+        graph.vertices.iter().for_each(|vertex| vertex.law.expressions(&mut note));
+        graph.experiment.observe.iter().for_each(|column| note(&column.expr));
+        for regulator in &graph.regulators {
+            note(&regulator.controlled);
+            note(&regulator.reference);
+        }
+        for (k, signal) in graph.signals.iter().enumerate() {
+            let Some(expr) = signal.law.expression() else { continue };
+            // What a signal or its hidden parts read of itself is no use of it.
+            let statement = self.signal_order.get(k).map(|order| order.0);
+            expr.leaves(&mut |leaf, _| {
+                if let Leaf::Signal(id) = leaf {
+                    let own = self.signal_order.get(id.index()).map(|order| order.0) == statement;
+                    read[id.index()] |= !own;
+                }
+            });
+        }
+        for (name, here) in self.outputs.iter().filter(|(_, here)| here.frame == FrameId(0)) {
+            let values = &self.frames[0].values;
+            if let Some(Meaning::Signal(id)) =
+                self.key_at(name, *here).and_then(|key| values.get(&*key))
+            {
+                read[id.index()] = true;
+            }
+        }
+        for (signal, _) in graph.signals.iter().zip(&read).filter(|(_, read)| !**read) {
+            if signal.origin != SignalOrigin::Signal || signal.name.contains('.') {
+                continue;
+            }
+            d.push(
+                Diagnostic::warning(
+                    "W0203",
+                    signal.span,
+                    format!("nothing reads the signal `{}`", signal.name),
+                )
+                .says("of no effect, and not observed")
+                .help(format!("add it to `observe`, say `output {0}`, or leave it out", signal.name)),
+            );
+        }
     }
 
     /// Notes the units of signals that are known.
@@ -206,7 +259,8 @@ impl Scope<'_> {
     }
 }
 
-/// Everything that can be observed by a name: inputs and signals, then the readings of every element in file order.
+/// Everything that can be observed by a name: inputs and signals, then the readings of every element in file order, then
+/// those of the ports of instances.
 pub fn observables(graph: &BondGraph) -> Vec<Observation> {
     let mut columns = vec![];
     for (k, signal) in graph.signals.iter().enumerate() {
@@ -242,6 +296,11 @@ pub fn observables(graph: &BondGraph) -> Vec<Observation> {
             _ => {}
         }
         columns.extend(graph.law_ports(id).filter_map(|end| stored_column(graph, end)));
+    }
+    for (name, bond) in &graph.ports {
+        for what in ["e", "f", "power"] {
+            columns.push(bond_column(graph, name, what, *bond, false));
+        }
     }
     columns
 }

@@ -22,6 +22,15 @@ pub struct Program {
     pub imports: Vec<Vec<(Span, Option<usize>)>>,
 }
 
+impl Program {
+    /// Whether the file that is run says what is observed.
+    pub fn observes(&self) -> bool {
+        self.files.first().is_some_and(|file| {
+            file.statements.iter().any(|s| matches!(s.kind, StatementKind::Observe(_)))
+        })
+    }
+}
+
 impl From<File> for Program {
     fn from(file: File) -> Program {
         Program { files: vec![file], imports: vec![vec![]] }
@@ -129,7 +138,11 @@ fn find(
                 let mut error = Diagnostic::from(error);
                 error.labels.insert(
                     0,
-                    crate::diagnostic::Label { span: name.span, text: "imported here".into() },
+                    crate::diagnostic::Label {
+                        span: name.span,
+                        text: "imported here".into(),
+                        of_use: false,
+                    },
                 );
                 d.push(error);
                 return None;

@@ -13,6 +13,9 @@ use crate::source::Span;
 /// The names of readings.
 pub const READINGS: [&str; 5] = ["e", "f", "q", "p", "power"];
 
+/// Storages that a hint names at most.
+const MOST_LISTED: usize = 8;
+
 impl Scope<'_> {
     /// What a reading means.
     pub fn reading(&mut self, call: &Call, span: Span, d: &mut Vec<Diagnostic>) -> Option<Expr> {
@@ -166,7 +169,19 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<Expr> {
         let port = &self.ports[port.0 as usize];
-        if matches!(what, "q" | "p") || !rest.is_empty() {
+        if let Some(member) = rest.first() {
+            d.push(
+                Diagnostic::error(
+                    "E0410",
+                    member.span,
+                    format!("`{}` is a port, and a port has no parts", port.name),
+                )
+                .says("no such part")
+                .label(port.span, "the port"),
+            );
+            return None;
+        }
+        if matches!(what, "q" | "p") {
             d.push(
                 Diagnostic::error("E0214", span, format!("a port stores no `{what}`"))
                     .says("cannot be read")
@@ -180,9 +195,11 @@ impl Scope<'_> {
 
     fn instance_reading(&self, what: &str, frame: FrameId, span: Span) -> Diagnostic {
         let inner = &self.frames[frame.0 as usize];
+        let stored = matches!(what, "q" | "p");
         let ports: Vec<String> = inner
             .ports
             .iter()
+            .filter(|_| !stored)
             .map(|port| format!("`{what}({})`", self.ports[port.0 as usize].name))
             .collect();
         let error = Diagnostic::error(
@@ -192,6 +209,26 @@ impl Scope<'_> {
         )
         .says("cannot be read as a whole")
         .label(inner.span, "declared here");
+        if stored {
+            let kind = if what == "q" { Shape::Compliance } else { Shape::Inertia };
+            let mut stores: Vec<String> = inner
+                .things
+                .values()
+                .filter_map(|thing| match thing {
+                    Thing::Vertex(id) if self.declarations[id.index()].element.shape == kind => {
+                        Some(format!("`{what}({})`", self.shown(*id)))
+                    }
+                    _ => None,
+                })
+                .collect();
+            stores.sort_unstable();
+            stores.truncate(MOST_LISTED);
+            let noun = if what == "q" { "compliance" } else { "inertia" };
+            return error.help(match stores.is_empty() {
+                true => format!("`{what}` is read of {}", a(noun)),
+                false => format!("read {} in it: {}", a(noun), stores.join(", ")),
+            });
+        }
         match ports.is_empty() {
             true => error.help(format!("read an element in it: `{what}({}…)`", inner.prefix)),
             false => {

@@ -9,7 +9,7 @@ use crate::bond::syntax::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::Table;
-use crate::quantity::{did_you_mean, nearest};
+use crate::quantity::{Dimension, did_you_mean, nearest};
 use crate::source::{FileId, SourceMap, Span};
 use std::cell::OnceCell;
 use std::collections::HashMap;
@@ -75,6 +75,8 @@ pub(super) struct Scope<'a> {
     pub hidden: HashMap<String, u32>,
     /// Tables that were read from files.
     pub tables: HashMap<FileId, Option<Arc<Table>>>,
+    /// The units that their headers give their two columns.
+    pub table_units: HashMap<FileId, [Option<Dimension>; 2]>,
     /// What the command line sets: name, text, value, and whether a parameter has taken it.
     pub set: Vec<Setting<'a>>,
     /// How far the evaluation of each parameter has come.

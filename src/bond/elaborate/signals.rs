@@ -147,7 +147,6 @@ impl Scope<'_> {
     fn input(&mut self, name: &Part, d: &mut Vec<Diagnostic>) -> Option<SignalId> {
         let key = self.full_key(name, d)?;
         let text = &*key;
-        let inputs = || self.graph.signals.iter().filter(|s| s.origin == SignalOrigin::Input);
         match self.value(text) {
             Some(Meaning::Signal(id))
                 if self.graph.signals[id.index()].origin == SignalOrigin::Input =>
@@ -170,13 +169,29 @@ impl Scope<'_> {
                 let error =
                     Diagnostic::error("E0219", name.span, format!("no input is called `{text}`"))
                         .says("not declared anywhere");
-                d.push(match nearest(text, inputs().map(|signal| signal.name.as_str())) {
+                let inputs = self.signals_here(|origin| origin == SignalOrigin::Input);
+                d.push(match nearest(text, inputs) {
                     Some(meant) => did_you_mean(error, name.span, text, meant),
                     None => error.help(format!("declare it: `input {text}`")),
                 });
             }
         }
         None
+    }
+
+    /// The signals that can be named here, in one order.
+    fn signals_here(&self, of: impl Fn(SignalOrigin) -> bool) -> Vec<&str> {
+        let values = self.frame().values.iter();
+        let mut names: Vec<&str> = values
+            .filter_map(|(name, meaning)| match meaning {
+                Meaning::Signal(id) if of(self.graph.signals[id.index()].origin) => {
+                    Some(name.as_ref())
+                }
+                _ => None,
+            })
+            .collect();
+        names.sort_unstable();
+        names
     }
 
     fn check_outputs(&mut self, d: &mut Vec<Diagnostic>) {
@@ -204,8 +219,7 @@ impl Scope<'_> {
                 let error =
                     Diagnostic::error("E0224", name.span, format!("no signal is called `{text}`"))
                         .says("not declared anywhere");
-                let names = self.graph.signals.iter().map(|s| s.name.as_str());
-                d.push(match nearest(text, names) {
+                d.push(match nearest(text, self.signals_here(|_| true)) {
                     Some(meant) => did_you_mean(error, name.span, text, meant),
                     None => error.help(format!("declare it: `signal {text} = …`")),
                 });

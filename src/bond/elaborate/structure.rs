@@ -71,7 +71,10 @@ type Joined = (BondId, bool, Joint);
 impl<'a> Scope<'a> {
     /// Takes in a port of the frame.
     pub fn declare_port(&mut self, port: &'a syntax::Port, span: Span, d: &mut Vec<Diagnostic>) {
-        let Some(key) = self.full_key(&port.name, d) else { return };
+        let Some(key) = self.full_key(&port.name, d) else {
+            self.frame_mut().excused.insert(&port.name.text);
+            return;
+        };
         if let Some(first) = self.frame().things.get(&key).copied() {
             let first = self.thing_span(first);
             d.push(
@@ -419,12 +422,18 @@ impl<'a> Scope<'a> {
                 let id = BondId(self.graph.bonds.len() as u32);
                 let span = half.span;
                 let end = End { vertex: to.vertex, port: to.named.unwrap_or(0) };
+                if let Tip::Port(port) = half.from {
+                    self.ports[port.0 as usize].bond.get_or_insert(id);
+                }
                 self.halves[at].bond = Some(id);
                 joined[to.vertex.index()].push((id, true, to));
                 let domain = Domain::Any;
                 self.graph.bonds.push(Bond { from: end, to: end, given: None, domain, span });
             }
         }
+        let named = self.ports.iter().filter(|port| port.frame != Here::ROOT.frame);
+        let named = named.filter_map(|port| Some((port.name.clone(), port.bond?)));
+        self.graph.ports = named.collect();
         joined
     }
 
@@ -448,7 +457,9 @@ impl<'a> Scope<'a> {
                     .help(format!("join it inside the model: {draw}")),
                 );
             }
-            if port.outer.is_none() {
+            // A model that is looked at without an instance has nothing around it.
+            let alone = frame.outer.is_none() && self.bodies[frame.body].header.is_some();
+            if port.outer.is_none() && !alone {
                 let root = port.frame == Here::ROOT.frame;
                 let outer = frame.outer.map(|here| &self.frames[here.frame.0 as usize]);
                 if outer.is_some_and(|outer| outer.excused.contains(local)) {

@@ -8,9 +8,9 @@ use super::scope::Scope;
 use super::value::Place;
 use crate::bond::graph::*;
 use crate::bond::syntax::{self, Argument, Call, File, Name, Value, data_files};
-use crate::diagnostic::{Diagnostic, Label};
+use crate::diagnostic::Diagnostic;
 use crate::expr::{Expr as Tree, Node, Table};
-use crate::quantity::Unit;
+use crate::quantity::{Dimension, Unit};
 use crate::source::{FileId, SourceMap, Span, loader};
 use std::sync::Arc;
 
@@ -22,9 +22,7 @@ pub fn load_tables(file: &File, map: &mut SourceMap, d: &mut Vec<Diagnostic>) {
             continue;
         }
         let Err(error) = loader::load(&path, map) else { continue };
-        let mut error = Diagnostic::from(error);
-        error.labels.push(Label { span: name.span, text: "the file of this table".to_string() });
-        d.push(error);
+        d.push(Diagnostic::from(error).label(name.span, "the file of this table"));
     }
 }
 
@@ -158,9 +156,19 @@ impl Scope<'_> {
             }
             return None;
         };
-        let table = read_points(self.map, file, d).map(Arc::new);
+        let table = read_points(self.map, file, d).map(|(table, units)| {
+            self.table_units.insert(file, units);
+            Arc::new(table)
+        });
         self.tables.insert(file, table.clone());
         table
+    }
+
+    /// The units of the columns of a file that holds the points of a table, as far as its header gives them.
+    pub(super) fn columns_of_file(&self, points: &syntax::Expr) -> Option<[Option<Dimension>; 2]> {
+        let name = file_of(points)?;
+        let file = self.map.find(&self.map.beside(name.span.file, &name.text))?;
+        self.table_units.get(&file).copied()
     }
 
     /// A number of a table; an error has been reported when there is none.
@@ -171,32 +179,8 @@ impl Scope<'_> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<f64> {
         let lowered = self.lower(expr, Place::constant(what), d)?;
-        let known = d.len();
-        let value = self.evaluate(&lowered, what, expr.span, d);
-        if value.is_none()
-            && d.len() == known
-            && self.signal_dimensions.is_empty()
-            && varies_in_order(&lowered)
-        {
-            d.push(
-                Diagnostic::error(
-                    "E0211",
-                    expr.span,
-                    "a table within a parameter can hold numbers only",
-                )
-                .says("a parameter stands here")
-                .help("use the table where the parameter is used"),
-            );
-        }
-        value
+        self.evaluate(&lowered, what, expr.span, d)
     }
-}
-
-/// Whether an expression speaks of parameters, which have no values while parameters are being read.
-fn varies_in_order(expr: &Expr) -> bool {
-    let mut any = false;
-    expr.leaves(&mut |_, _| any = true);
-    any
 }
 
 fn form(span: Span, message: &str) -> Diagnostic {
@@ -228,8 +212,12 @@ struct Cell<'t> {
     span: Span,
 }
 
-/// The points of a file of two columns.
-fn read_points(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> Option<Table> {
+/// The points of a file of two columns, and the units that its header gives.
+fn read_points(
+    map: &SourceMap,
+    file: FileId,
+    d: &mut Vec<Diagnostic>,
+) -> Option<(Table, [Option<Dimension>; 2])> {
     let text = &map.file(file)?.text;
     let whole = Span::new(file, 0, 0);
     let wrong = |span, message: String| {
@@ -238,6 +226,7 @@ fn read_points(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> Option
     };
     let mut table = Table { x: vec![], y: vec![] };
     let mut factors = [1.0, 1.0];
+    let mut units = [None, None];
     let mut first = true;
     let mut failed = false;
     let mut start = 0;
@@ -257,9 +246,10 @@ fn read_points(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> Option
         };
         let values = [number(x.text), number(y.text)];
         if std::mem::take(&mut first) && values == [None, None] {
-            for (factor, cell) in factors.iter_mut().zip([x, y]) {
+            for ((factor, unit), cell) in factors.iter_mut().zip(&mut units).zip([x, y]) {
                 match unit_of_header(cell) {
-                    Ok(found) => *factor = found,
+                    Ok(Some(found)) => (*factor, *unit) = (found.factor, Some(found.dimension)),
+                    Ok(None) => {}
                     Err(error) => {
                         d.push(*error);
                         failed = true;
@@ -285,7 +275,7 @@ fn read_points(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> Option
         d.push(wrong(whole, "the file of a table holds no points".to_string()));
         return None;
     }
-    (!failed).then_some(table)
+    (!failed).then_some((table, units))
 }
 
 /// The fields of a line: between semicolons, else between commas, tabs or blanks.
@@ -323,13 +313,13 @@ fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
-/// How many SI units the unit in the brackets of a header is; 1 without one.
-fn unit_of_header(cell: &Cell<'_>) -> Result<f64, Box<Diagnostic>> {
+/// The unit in the brackets of a header.
+fn unit_of_header(cell: &Cell<'_>) -> Result<Option<Unit>, Box<Diagnostic>> {
     let bracket = cell.text.split_once('[').and_then(|(_, rest)| rest.strip_suffix(']'));
     let Some(text) = bracket.map(str::trim).filter(|text| !text.is_empty()) else {
-        return Ok(1.0);
+        return Ok(None);
     };
-    Unit::parse(text).map(|unit| unit.factor).map_err(|_| {
+    Unit::parse(text).map(Some).map_err(|_| {
         Box::new(
             Diagnostic::error("E0252", cell.span, format!("`{text}` is no unit"))
                 .says("the unit of this column")

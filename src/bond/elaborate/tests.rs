@@ -455,14 +455,33 @@ fn transfer_functions_are_chains_of_the_size_of_their_input() {
 
 /// A table that reads `points.csv` with this content.
 fn with_file(content: &str) -> Built {
+    beside_file(&around("signal y = table(f(m), file(\"points.csv\"))"), content)
+}
+
+fn beside_file(text: &str, content: &str) -> Built {
     let mut map = SourceMap::default();
-    let text = around("signal y = table(f(m), file(\"points.csv\"))");
     let file = map.add("models/test.bg", text);
     map.add("models/points.csv", content);
     let mut d = vec![];
     let program = load(&mut map, file, &[], &mut d);
     let graph = elaborate(&program, &map, &Overrides::default(), &mut d);
     Built { graph, d, map }
+}
+
+#[test]
+fn columns_of_files_have_units() {
+    let text = "Se:U(1 V) -> 1:m -> R:r(1 Ohm)\nsignal y = table(f(m), file(\"points.csv\")) + 3 bar\n";
+    for content in ["i [mA], p [bar]\n0,1\n1,2\n", "i, p\n0,1\n1,2\n", "0,1\n1,2\n"] {
+        assert_eq!(beside_file(text, content).lines(), [""; 0], "{content}");
+    }
+    for (header, line) in [
+        ("t [ms], p [bar]", "E0306 `file(\"points.csv\")`: `table` mixes a time (s) and a current (A)"),
+        ("i [A], v [V]", "E0304 `3 bar`: a pressure (Pa) is added to a voltage (V)"),
+    ] {
+        let built = beside_file(text, &format!("{header}\n0,1\n1,2\n"));
+        let lines = built.lines();
+        assert!(matches!(lines.as_slice(), [only] if only.starts_with(line)), "{lines:?}");
+    }
 }
 
 #[test]

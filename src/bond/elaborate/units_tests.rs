@@ -273,7 +273,7 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
     (
         "C:plate(e1 = q1*(1 mm + q2)/(3e-12 F), e2 = q1^2/(6e-12 F*m))\nm -> plate.1\nplate.2 -> I:mass(1 g)",
         "E0307",
-        &["q1*(1 mm + q2)/(3e-12 F", "Se:U(10 V)"],
+        &["q1*(1 mm + q2)/(3e-12 F)", "Se:U(10 V)"],
         "`e1 = …` of the compliance `plate`",
     ),
     (
@@ -282,7 +282,7 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
         &["3 s", "I:mass(1 g)"],
         "`q2_0 = …` of the compliance `plate`",
     ),
-    ("m -> R:r(f = e/(3 A))", "E0307", &["e/(3 A", "Se:U(10 V)"], "`f = …` of the dissipator `r`"),
+    ("m -> R:r(f = e/(3 A))", "E0307", &["e/(3 A)", "Se:U(10 V)"], "`f = …` of the dissipator `r`"),
     ("m -> R:r(e = vt*tanh(f/vt))", "E0305", &["f/vt", "5 V"], "`tanh` takes a pure number"),
     (
         "m -> R:r(f = orifice(e, 2 Pa^0.5*s/m^3, 1e-5 m^3/s))",
@@ -311,14 +311,32 @@ const WRONG: &[(&str, &str, &[&str], &str)] = &[
     ),
     (
         "m -> C:c(10 uF, e0 = 3 bar)",
-        "E0308",
+        "E0307",
         &["3 bar", "Se:U(10 V)"],
-        "is of domain hydraulic, but its bond is electrical",
+        "`e0 = …` of the compliance `c` is a pressure (Pa), but its electrical bond needs a voltage (V)",
+    ),
+    (
+        "m -> I:l(1 mH, f0 = 2 V)",
+        "E0307",
+        &["2 V", "Se:U(10 V)"],
+        "`f0 = …` of the inertia `l` is a voltage (V), but its electrical bond needs a current (A)",
+    ),
+    (
+        "shaft -> R:b(2 Ohm)",
+        "E0308",
+        &["2 Ohm", "I:J(2 kg*m^2)"],
+        "the dissipator `b` is of domain electrical, but its bond is rotation",
+    ),
+    (
+        "Se:hot(300 K) -> 1:w -> R:wall(2 K/W), Sf:s(3 W/K)",
+        "E0308",
+        &["3 W/K", "R:wall(2 K/W)"],
+        "the flow source `s` is of domain thermal, but its bond is pseudo-thermal",
     ),
     (
         "m -> C:c(der(e) = f/(10 mH))",
         "E0307",
-        &["f/(10 mH", "Se:U(10 V)"],
+        &["f/(10 mH)", "Se:U(10 V)"],
         "`der(e) = …` of the compliance `c`",
     ),
     (

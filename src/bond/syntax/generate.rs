@@ -214,9 +214,10 @@ impl Generator {
             0 => String::new(),
             1 => "()".into(),
             _ => self.bracketed("(", ")", |g| {
-                g.list(|g| match g.chance(50) {
-                    true => g.pick(NAMES).to_string(),
-                    false => format!("{} = {}", g.pick(NAMES), g.value(2)),
+                g.list(|g| match g.below(4) {
+                    0 | 1 => g.pick(NAMES).to_string(),
+                    2 => format!("{} \"in; ohms\"", g.pick(NAMES)),
+                    _ => format!("{} = {}", g.pick(NAMES), g.value(2)),
                 })
             }),
         };

@@ -181,11 +181,15 @@ fn model(
     for pair in pairs.filter(|pair| pair.as_rule() == Rule::header_parameter) {
         let mut parts = pair.into_inner();
         let name = reader.name(&parts.next()?);
-        let default = match parts.find(|part| part.as_rule() == Rule::expression) {
-            Some(value) => Some(parse::expression(reader, value, d)?),
-            None => None,
-        };
-        parameters.push(HeaderParameter { name, default });
+        let (mut default, mut description) = (None, None);
+        for part in parts {
+            match part.as_rule() {
+                Rule::expression => default = Some(parse::expression(reader, part, d)?),
+                Rule::text => description = Some(reader.text(&part)),
+                _ => {}
+            }
+        }
+        parameters.push(HeaderParameter { name, default, description });
     }
     Some(Head::Model { name, parameters })
 }

@@ -129,13 +129,16 @@ pub struct Model {
     pub body: Vec<Statement>,
 }
 
-/// A parameter in the header of a model: `L = 1.2 mH`, or `Jmp` alone, which each instance must give.
+/// A parameter in the header of a model: `L = 1.2 mH "armature inductance"`, or `Jmp` alone, which each
+/// instance must give.
 #[derive(Clone, Debug)]
 pub struct HeaderParameter {
     /// Its name.
     pub name: Name,
     /// What it is when an instance does not say.
     pub default: Option<Expr>,
+    /// The text in quotes, without them.
+    pub description: Option<Name>,
 }
 
 /// A port of a model.

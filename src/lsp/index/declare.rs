@@ -71,7 +71,10 @@ fn header(index: &mut Index, body: BodyId, model: &Model) {
         let whole =
             parameter.default.as_ref().map_or(name.span, |value| name.span.join(value.span));
         let definition = Definition { name: name.span, whole };
-        index.declare_value(body, &name.text, Sort::Parameter { public: true }, definition);
+        let sort = Sort::Parameter { public: true };
+        let symbol = index.declare_value(body, &name.text, sort, definition);
+        let text = parameter.description.as_ref().map_or("", |text: &Name| text.text.as_str());
+        index.symbols[symbol.0].description = text.to_string();
     }
 }
 
