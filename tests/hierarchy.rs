@@ -291,3 +291,77 @@ fn ten_thousand_elements_in_instances() {
     assert_eq!(d, []);
     assert_eq!(causality.states.len(), 2 * 1666);
 }
+
+#[test]
+fn ports_of_instances_are_listed_and_observed() {
+    let text = format!(
+        "model Drive(Phi = 0.5 V*s) {{\n  port in a : electrical\n  port out b : rotation\n  DcMotor:motor(Jmp = 1 g*m^2, Phi = Phi)\n  a -> motor.supply\n  motor.shaft -> b\n}}\n\
+         {MOTOR}Drive:x()\nSe:U(3 V) -> x.a\nx.b -> R:load(1 mN*m*s)\nsimulate until 10 ms step 1 ms\n"
+    );
+    let graph = graph(&text);
+    let listed = elaborate::observables(&graph);
+    let ports = ["x.a", "x.b", "x.motor.supply", "x.motor.shaft"];
+    for port in ports {
+        for (what, unit) in [("e", ["V", "N*m"]), ("f", ["A", "rad/s"]), ("power", ["W", "W"])] {
+            let name = format!("{what}({port})");
+            let found = listed.iter().find(|item| item.name == name);
+            let electrical = port.ends_with('a') || port.ends_with("supply");
+            let unit = unit[usize::from(!electrical)];
+            assert_eq!(found.map(|item| item.si_unit.as_str()), Some(unit), "{name}");
+        }
+    }
+    // Nothing is listed that cannot be observed under this name, and no port stores anything.
+    assert!(listed.iter().all(|item| !ports.iter().any(|p| item.name == format!("q({p})"))));
+    let all: Vec<&str> = listed.iter().map(|item| item.name.as_str()).collect();
+    let overrides = Overrides { observe: Some(all.join(", ")), ..Overrides::default() };
+    let observed = graph_with(&text, &overrides).unwrap();
+    for (one, other) in listed.iter().zip(&observed.experiment.observe) {
+        assert_eq!(one.name, other.name);
+        assert_eq!(one.si_unit, other.si_unit, "{}", one.name);
+    }
+    assert_eq!(observed.experiment.observe.len(), listed.len());
+}
+
+#[test]
+fn causal_warnings_of_a_model_name_its_instances() {
+    let model = "model Two(J = 1 g*m^2) {\n  port in a : rotation\n  a -> 1:s -> I:one(J), I:two(2*J), R:r(1 N*m*s)\n}\n";
+    let loops = "model Rings(Z = 1 Ohm) {\n  port in a : electrical\n  a -> 0:s -> R:one(Z), 1:t\n  t -> R:two(Z), R:three(Z)\n}\n";
+    for (model, kind, code) in [(model, "Two", "W0401"), (loops, "Rings", "W0402")] {
+        let source = if kind == "Two" { "Se" } else { "Sf" };
+        let text = format!(
+            "{model}{kind}:first()\n{source}:U(3) -> first\n{kind}:second()\n{source}:V(3) -> second\n"
+        );
+        let mut map = SourceMap::default();
+        let file = map.add("test.bg", text);
+        let graph = built(&mut map, file, &Overrides::default()).unwrap();
+        let mut d = vec![];
+        causality::assign(&graph, &mut d).unwrap();
+        let used = |d: &Diagnostic| -> Vec<String> {
+            let labels = d.labels.iter().filter(|label| label.of_use);
+            labels.map(|l| format!("{}: {}", map.text(l.span), l.text)).collect()
+        };
+        let found: Vec<_> = d.iter().filter(|d| d.code == code).map(used).collect();
+        assert_eq!(
+            found,
+            [
+                [format!("{kind}:first(): in `first`, used here")],
+                [format!("{kind}:second(): in `second`, used here")]
+            ]
+        );
+        // One line of the model is one warning, however many instances there are.
+        bondspice::diagnostic::merge_repeats(&mut d, 0);
+        let merged: Vec<_> = d.iter().filter(|d| d.code == code).collect();
+        assert_eq!(merged.len(), 1);
+        assert!(merged[0].notes.iter().any(|note| note.contains("once more")));
+    }
+}
+
+#[test]
+fn parameters_of_a_header_may_be_described() {
+    let text = "model M(L = 1 mH \"inductance; of the coil\", Z \"the load\") {\n  port in a\n  a -> 1:m -> I:L, R:Z\n}\n\
+        M:x(Z = 2 Ohm)\nSe:U(1 V) -> x\n";
+    let graph = graph(text);
+    let described: Vec<_> =
+        graph.parameters.iter().map(|p| (p.name.as_str(), p.description.as_str())).collect();
+    assert_eq!(described, [("x.L", "inductance; of the coil"), ("x.Z", "the load")]);
+}

@@ -85,8 +85,11 @@ impl Diagnostic {
         span: Span,
         message: impl Into<String>,
     ) -> Diagnostic {
-        let labels =
-            if span.is_none() { vec![] } else { vec![Label { span, text: String::new(), of_use: false }] };
+        let labels = if span.is_none() {
+            vec![]
+        } else {
+            vec![Label { span, text: String::new(), of_use: false }]
+        };
         Diagnostic {
             code,
             severity,

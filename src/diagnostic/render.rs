@@ -188,8 +188,11 @@ type Mend = (String, Window, Vec<(std::ops::Range<usize>, String)>);
 
 /// The mend as a window with patches, where all of it stands in one file and near each other.
 fn mend(fix: &Fix, map: &SourceMap) -> Option<Mend> {
-    let labels: Vec<Label> =
-        fix.edits.iter().map(|(span, _)| Label { span: *span, text: String::new(), of_use: false }).collect();
+    let labels: Vec<Label> = fix
+        .edits
+        .iter()
+        .map(|(span, _)| Label { span: *span, text: String::new(), of_use: false })
+        .collect();
     let group: Vec<(usize, &Label, Lines)> = labels
         .iter()
         .enumerate()

@@ -203,7 +203,9 @@ fn spans_cover_what_they_mean() {
     assert_eq!((right.span.start, right.span.end), (8, 14));
     assert_eq!((product.span.start, product.span.end), (4, 15));
     // Whole values and what a sign stands before have their brackets too.
-    for (text, place) in [("( (1 + x) )", (0, 11)), ("-(1 + x)", (0, 8)), ("(1 + x)*2 - (3)", (0, 15))] {
+    for (text, place) in
+        [("( (1 + x) )", (0, 11)), ("-(1 + x)", (0, 8)), ("(1 + x)*2 - (3)", (0, 15))]
+    {
         let expr = parse_bond(text).unwrap();
         assert_eq!((expr.span.start, expr.span.end), place, "{text}");
     }

@@ -257,13 +257,7 @@ impl<'a> Scope<'a> {
     }
 
     /// Whether what an element states beside one value is of the domain of that one's bond.
-    fn fits(
-        &mut self,
-        id: VertexId,
-        other: &Stated<'a>,
-        one: &Stated<'a>,
-        domain: Domain,
-    ) -> bool {
+    fn fits(&mut self, id: VertexId, other: &Stated<'a>, one: &Stated<'a>, domain: Domain) -> bool {
         if other.ports != one.ports || other.value.span() == one.value.span() {
             return false;
         }

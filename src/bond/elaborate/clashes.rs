@@ -321,7 +321,11 @@ pub(super) fn merge(clashes: Vec<Clash>) -> Vec<Diagnostic> {
                 if known.labels.len() < MOST_PLACES && known.labels.iter().all(|l| l.span != place)
                 {
                     let text = format!("clashes here too: {}", clash.diagnostic.message);
-                    known.labels.push(crate::diagnostic::Label { span: place, text, of_use: false });
+                    known.labels.push(crate::diagnostic::Label {
+                        span: place,
+                        text,
+                        of_use: false,
+                    });
                 }
                 at
             }

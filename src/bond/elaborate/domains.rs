@@ -107,10 +107,7 @@ impl Groups {
 /// two-port can decide; unless it shall be guessed: then what all elements share goes to the likelier, which stands first
 /// in the table, and what they contend for to the element that stands first in the text (not to a magnetic one, which is
 /// mostly an electrical source of the wrong kind).
-pub(super) fn winner(
-    votes: &[(VertexId, Mask)],
-    guess: bool,
-) -> Result<(Domain, VertexId), Mask> {
+pub(super) fn winner(votes: &[(VertexId, Mask)], guess: bool) -> Result<(Domain, VertexId), Mask> {
     let mut tally = [0usize; DOMAINS.len()];
     let mut common = Mask::MAX;
     for (_, mask) in votes {

@@ -7,8 +7,7 @@ fn said(text: &str, set: &[(&str, &str)], observe: Option<&str>) -> Vec<Diagnost
     let (mut map, mut d) = (SourceMap::default(), vec![]);
     let file = map.add(concat!(env!("CARGO_MANIFEST_DIR"), "/models/test.bg"), text);
     let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect();
-    let overrides =
-        Overrides { set, observe: observe.map(str::to_string), ..Overrides::default() };
+    let overrides = Overrides { set, observe: observe.map(str::to_string), ..Overrides::default() };
     let program = load(&mut map, file, &[], &mut d);
     elaborate(&program, &map, &overrides, &mut d);
     d
@@ -58,7 +57,11 @@ const SLIPS: &[(&str, &str, &str)] = &[
     // Elements, junctions, instances, ports.
     ("f(wheel)", "f(weel)", "did you mean `wheel`?"),
     ("f(mesh)", "f(mehs)", "did you mean `mesh`?"),
-    ("coil(inductance, f0 = 2 A), motor", "coil(inductance, f0 = 2 A), mtor", "did you mean `motor`?"),
+    (
+        "coil(inductance, f0 = 2 A), motor",
+        "coil(inductance, f0 = 2 A), mtor",
+        "did you mean `motor`?",
+    ),
     ("motor.shaft ->", "motor.shft ->", "did you mean `shaft`?"),
     ("motor.shaft ->", "moter.shaft ->", "did you mean `motor`?"),
     ("rotor -> R", "roter -> R", "did you mean `rotor`?"),

@@ -88,7 +88,10 @@ impl Scope<'_> {
                     format!("nothing reads the signal `{}`", signal.name),
                 )
                 .says("of no effect, and not observed")
-                .help(format!("add it to `observe`, say `output {0}`, or leave it out", signal.name)),
+                .help(format!(
+                    "add it to `observe`, say `output {0}`, or leave it out",
+                    signal.name
+                )),
             );
         }
     }

@@ -470,12 +470,16 @@ fn beside_file(text: &str, content: &str) -> Built {
 
 #[test]
 fn columns_of_files_have_units() {
-    let text = "Se:U(1 V) -> 1:m -> R:r(1 Ohm)\nsignal y = table(f(m), file(\"points.csv\")) + 3 bar\n";
+    let text =
+        "Se:U(1 V) -> 1:m -> R:r(1 Ohm)\nsignal y = table(f(m), file(\"points.csv\")) + 3 bar\n";
     for content in ["i [mA], p [bar]\n0,1\n1,2\n", "i, p\n0,1\n1,2\n", "0,1\n1,2\n"] {
         assert_eq!(beside_file(text, content).lines(), [""; 0], "{content}");
     }
     for (header, line) in [
-        ("t [ms], p [bar]", "E0306 `file(\"points.csv\")`: `table` mixes a time (s) and a current (A)"),
+        (
+            "t [ms], p [bar]",
+            "E0306 `file(\"points.csv\")`: `table` mixes a time (s) and a current (A)",
+        ),
         ("i [A], v [V]", "E0304 `3 bar`: a pressure (Pa) is added to a voltage (V)"),
     ] {
         let built = beside_file(text, &format!("{header}\n0,1\n1,2\n"));

@@ -31,8 +31,14 @@ fn models_without_instances_are_checked() {
         ("mm -> R:r(k)", "E0206 mm: no element or junction is called `mm`"),
         ("m -> X:r(k)", "E0204 X: `X` is no kind of element"),
         ("m -> R:r(k)\n  1:m", "E0203 1:m: `m` is declared twice"),
-        ("m -> R:r(1 F)", "E0307 1 F: the value of the dissipator `r` is a capacitance (F), but its electrical bond needs a resistance (Ohm)"),
-        ("m -> M:inner(k = 2, n = 2)", "E0239 M:inner(k = 2, n = 2): the model `M` contains itself"),
+        (
+            "m -> R:r(1 F)",
+            "E0307 1 F: the value of the dissipator `r` is a capacitance (F), but its electrical bond needs a resistance (Ohm)",
+        ),
+        (
+            "m -> M:inner(k = 2, n = 2)",
+            "E0239 M:inner(k = 2, n = 2): the model `M` contains itself",
+        ),
         ("1:alone -> R:r(k)", "E0401 1:alone: the 1-junction `alone` has only one bond"),
         ("signal s = lagg(u, 1 s)", "E0210 lagg: unknown function `lagg`"),
         ("output y", "E0224 y: no signal is called `y`"),
