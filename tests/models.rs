@@ -6,8 +6,11 @@
 
 mod references;
 
+use bondspice::bond::causality;
 use bondspice::bond::elaborate::Overrides;
-use bondspice::cli::pipeline::run_text;
+use bondspice::cli::pipeline::{self, run_text};
+use bondspice::second;
+use bondspice::source::SourceMap;
 use bondspice::trace::Trace;
 use references::{agree, common, file, options, reference};
 
@@ -407,6 +410,70 @@ fn switches_stand_beside_dependent_storages() {
         for name in ["i(l1)", "i(l2)"] {
             let found = column(&trace, name)[row];
             assert!((found - current).abs() < 2e-3, "{name} at {t}: {found} for {current}");
+        }
+    }
+}
+
+/// A text's observed columns on both routes, on its own grid.
+fn both_routes(text: &str, overrides: &Overrides) -> [Trace; 2] {
+    let (trace, _) = run_text("both.bg", text, overrides).unwrap();
+    let mut map = SourceMap::default();
+    let (file, mut d) = (map.add("both.bg", text), vec![]);
+    let graph = pipeline::graph(&mut map, file, &Overrides::default(), &mut d).unwrap();
+    let causality = causality::assign(&graph, &mut d).unwrap();
+    let run = second::integrate(&graph, &causality, trace.time(), &Default::default(), &mut d);
+    let run = run.unwrap_or_else(|| panic!("{d:#?}"));
+    let mut own = Trace::new(run.names, vec![]);
+    own.columns = run.columns;
+    [trace, own]
+}
+
+#[test]
+fn levers_that_move_join_two_inertias() {
+    // v = r(th)·w with r = 1.5·sin(th), or 1/r: J·w² + m·v² is kept, so w = w0·√(j(th0)/j(th)) and the time that th takes
+    // is ∫ √(j/j0)/w0 dth, j = J + m·(v/w)². The force at the mass is m·dv/dt. The first starts where its ratio is 0.
+    let (inertia, mass) = (2.0f64, 3.0f64);
+    let cases = [("1.5*sin(th)", 0.0, 6), ("1.5*sin(th)", 0.5, 6), ("gain = 1.5*sin(th)", 1.0, 2)];
+    for (modulus, th0, until) in cases {
+        let turned = modulus.starts_with("gain");
+        let text = format!(
+            "1:w -> I:J(2, p0 = 2)\nw -> MTF:lever({modulus}) -> 1:v -> I:m(3)\nsignal th = integ(f(w), {th0})\n\
+             simulate until {until} s step 0.05 s\nobserve th, f(w) as \"w\", f(v) as \"v\", e(m) as \"F\"\n"
+        );
+        let over = |th: f64| if turned { 1.0 / (1.5 * th.sin()) } else { 1.5 * th.sin() };
+        let slope = |th: f64| match turned {
+            true => -th.cos() / (1.5 * th.sin() * th.sin()),
+            false => 1.5 * th.cos(),
+        };
+        let whole = |th: f64| inertia + mass * over(th) * over(th);
+        let speed = |th: f64| (whole(th0) / whole(th)).sqrt();
+        let takes = |th: f64| {
+            // Simpson's rule.
+            let n = 2000;
+            let h = (th - th0) / f64::from(n);
+            let weight = |i| if i == 0 || i == n { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
+            (0..=n).map(|i| weight(i) / speed(th0 + f64::from(i) * h)).sum::<f64>() * h / 3.0
+        };
+        for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+            let traces = both_routes(&text, &options(reltol));
+            for (trace, route) in traces.iter().zip(["circuit", "second route"]) {
+                let mut exact = Trace::new(trace.names.clone(), vec![]);
+                exact.columns[0] = trace.time().to_vec();
+                let mut th = th0;
+                for t in trace.time() {
+                    for _ in 0..20 {
+                        th -= (takes(th) - t) * speed(th);
+                    }
+                    let w = speed(th);
+                    let v = over(th) * w;
+                    // j·w' = −m·r·r'·w², v' = r'·w² + r·w'
+                    let rate = -mass * over(th) * slope(th) * w * w / whole(th);
+                    let force = mass * (slope(th) * w * w + over(th) * rate);
+                    let row = [th, w, v, force];
+                    exact.columns[1..].iter_mut().zip(row).for_each(|(column, x)| column.push(x));
+                }
+                agree(&format!("{modulus} from {th0}, {route}"), trace, &exact, tolerance);
+            }
         }
     }
 }

@@ -2,18 +2,29 @@
 
 use super::{Run, count_system, past};
 use crate::circuit::Waveform;
+use crate::linear::Singular;
 use crate::sim::explain::{Failure, Moment, failure};
 use crate::sim::methods::{self, Method};
 use crate::sim::newton::{Cut, Stage, solve_stage};
-use crate::sim::op::{self, Trouble};
+use crate::sim::op::{self, State, Trouble};
 
-/// The part of the tolerance that each step gets where the circuit is of index 2.
+/// The part of the tolerance that each step gets where the circuit is of index 2, at a `reltol` of 1e-6. A method of
+/// order 2 makes more of the errors of its steps: over a run they add up to their tolerance^(2/3). Below 1e-6 the part
+/// falls with the root of `reltol`, so that the run's error falls with `reltol`; not down to rounding.
 const INDEX_2_PART: f64 = 0.05;
+
+fn index_2_part(reltol: f64) -> f64 {
+    let part = INDEX_2_PART * (reltol / 1e-6).sqrt();
+    part.max(1e-12 / reltol).min(INDEX_2_PART)
+}
 
 /// No step is longer than this part of a source's period. Where the circuit is of index 2, currents are rates of what
 /// the sources prescribe, and no error test sees them.
 const SIGHT: f64 = 0.25;
 const INDEX_2_SIGHT: f64 = 0.02;
+
+/// Multiples of it, without their whole parts, lie about evenly between 0 and 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The highest frequency that a source swings with after a moment; 0 where it does not.
 fn swings(waveform: &Waveform, t: f64) -> f64 {
@@ -80,16 +91,10 @@ impl Run<'_> {
                 }
             }
             Err(Trouble::Cut(Cut::Singular(singular))) => {
-                let n = self.network.system.equations();
                 self.index2 = true;
                 self.untested.fill(false);
-                for column in singular.columns.iter().flatten() {
-                    if let Some(untested) =
-                        self.untested.get_mut(*column as usize).filter(|_| (*column as usize) < n)
-                    {
-                        *untested = true;
-                    }
-                }
+                self.leave_untested(&singular);
+                self.look_about();
                 if matches!(self.method, Method::Rodas4 | Method::Rodas5p) {
                     self.method = Method::TrBdf2;
                     self.network.statistics.method = Method::TrBdf2.name().into();
@@ -121,6 +126,38 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// What a null vector moves is of index 2.
+    fn leave_untested(&mut self, singular: &Singular) {
+        for column in singular.columns.iter().flatten() {
+            if let Some(untested) = self.untested.get_mut(*column as usize) {
+                *untested = true;
+            }
+        }
+    }
+
+    /// Looks for null vectors at other points than this one too: where a modulus is 0 they move less than elsewhere.
+    fn look_about(&mut self) {
+        if self.network.system.is_linear() {
+            return;
+        }
+        let mut point = self.state.x.clone();
+        for turn in [GOLDEN, 2.0 * GOLDEN] {
+            for (k, x) in point.iter_mut().enumerate() {
+                let part = (turn * (k + 1) as f64).fract() - 0.5;
+                let size = self.state.x[k].abs().max(1e3 * self.floors[k]);
+                *x = self.state.x[k] + part * size;
+            }
+            self.network.linearise(&point, self.state.t, false);
+            let held = &self.network.system.held;
+            if self.network.non_finite_law().is_none()
+                && let Err(singular) = self.network.factorise_frozen(held)
+            {
+                self.leave_untested(&singular);
+            }
+        }
+        self.network.forget_pivots();
+    }
+
     /// Sets the longest step by the periods of the sources that swing.
     fn look_ahead(&mut self) {
         let part = if self.index2 { INDEX_2_SIGHT } else { SIGHT };
@@ -129,9 +166,8 @@ impl Run<'_> {
         self.sight = part / fastest.fold(0.0, f64::max);
     }
 
-    /// Three short steps of the backward Euler method: the first lets charges jump to where loops of capacitors and
-    /// sources want them, the others give the currents that flow from there on. The straight line through those two
-    /// leads back to the moment itself, so that nothing starts late.
+    /// Where charges jump to, and the rates from there on, from short steps of the backward Euler method: taken with a
+    /// length and with half of it, twice the latter less the former.
     pub(super) fn redistribute(&mut self, moment: Moment) -> Result<(), Failure> {
         let full = 1e-6 * self.distance();
         let start = self.state.clone();
@@ -139,7 +175,20 @@ impl Run<'_> {
         for shrink in [1.0, 1e-2, 1e-4] {
             self.state.copy_from(&start);
             outcome = self.jump(full * shrink);
+            if outcome.is_err() {
+                continue;
+            }
+            let whole = self.state.clone();
+            self.state.copy_from(&start);
+            outcome = self.jump(0.5 * full * shrink);
             if outcome.is_ok() {
+                let twice = |half: &mut [f64], whole: &[f64]| {
+                    half.iter_mut().zip(whole).for_each(|(half, whole)| *half += *half - whole);
+                };
+                let State { x, w, q, .. } = &mut self.state;
+                twice(x, &whole.x);
+                twice(w, &whole.w);
+                twice(q, &whole.q);
                 return Ok(());
             }
         }
@@ -153,6 +202,9 @@ impl Run<'_> {
         }
     }
 
+    /// Three steps: the first lets charges jump to where loops of capacitors and sources want them, the others give the
+    /// currents that flow from there on. The straight line through those two leads back to the moment itself, so that
+    /// nothing starts late.
     fn jump(&mut self, h: f64) -> Result<(), Cut> {
         let start = self.state.t;
         self.euler(h)?;
@@ -197,9 +249,8 @@ impl Run<'_> {
 
     /// Takes the values of `state` into the weights.
     pub(super) fn weigh(&mut self) {
-        // A method of order 2 makes more of the errors of its steps: over a run they add up to reltol^(2/3).
-        let part = if self.index2 { INDEX_2_PART } else { 1.0 };
         let reltol = self.settings.reltol;
+        let part = if self.index2 { index_2_part(reltol) } else { 1.0 };
         for (k, x) in self.state.x.iter().enumerate() {
             self.largest[k] = self.largest[k].max(x.abs());
             self.weights[k] = if self.untested[k] {
