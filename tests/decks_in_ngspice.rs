@@ -35,6 +35,20 @@ Rg n 0 1
 .save v(p)
 ";
 
+const LINES: &str = "\
+* two lines in a row, the second one given by its wave, between unmatched ends
+V1 s 0 PULSE(0 2 1n 0.3n 0.3n 6n 100n)
+R1 s a 30
+T1 a 0 b 0 Z0=50 TD=1.5n
+C1 b 0 4p
+T2 b 0 c 0 Z0=75 F=200meg NL=0.5
+R2 c 0 200
+L2 c d 20n
+R3 d 0 40
+.options reltol=1e-5
+.save v(a) v(b) v(c) i(L2)
+";
+
 const BUCK: &str = "\
 * buck converter with a switch and a diode
 Vin in 0 24
@@ -125,4 +139,9 @@ fn a_buck_converter_with_switch_and_diode() {
 #[test]
 fn a_buck_converter_with_two_switches() {
     same(TWO_SWITCHES, ".tran 1u 500u uic", ".tran 1u 500u 0 20n uic", 1e-3);
+}
+
+#[test]
+fn lossless_lines() {
+    same(LINES, ".tran 0.05n 40n", ".tran 0.05n 40n 0 2p", 1e-3);
 }

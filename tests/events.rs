@@ -238,3 +238,31 @@ fn a_system_whose_events_accumulate_comes_to_its_end() {
     assert!(statistics.accepted < 20_000, "{statistics}");
     assert!(column(&trace, "x").last().unwrap().abs() < 1e-4, "{statistics}");
 }
+
+#[test]
+fn switches_without_hysteresis_slide_along_their_threshold() {
+    // 1 V through 1 kOhm onto a switch that closes above 0.5 V of its own and opens below: it holds 0.5 V, at once or, with
+    // a capacitor of 1 uF, from ln 2 of the time constant on; while it does, it takes 0.5 mA.
+    for (capacitor, tolerance) in [("", 1e-6), ("C1 b 0 1u ic=0\n", 1e-6)] {
+        let text = format!(
+            "a switch that opens itself\nV1 a 0 1\nR1 a b 1k\n{capacitor}S1 b 0 b 0 sm\n\
+             .model sm sw(vt=0.5 vh=0 ron=1 roff=1e9)\n.options reltol=1e-6\n.print tran v(b) i(v1)\n.tran 10u 5m uic\n.end\n"
+        );
+        let run = run_text("slides.cir", &text, &Overrides::default());
+        let (trace, statistics) = run.unwrap_or_else(|d| panic!("{d:#?}"));
+        assert_eq!(statistics.warnings.len(), 1, "{statistics}");
+        assert_eq!(statistics.warnings[0].code, "W0803", "{statistics}");
+        assert!(statistics.warnings[0].message.contains("`S1`"), "{:?}", statistics.warnings[0]);
+        let mut rows = 0;
+        for ((t, v), i) in
+            trace.time().iter().zip(column(&trace, "v(b)")).zip(column(&trace, "i(v1)"))
+        {
+            let free = 1.0 - (-t / 1e-3).exp();
+            let exact = if capacitor.is_empty() { 0.5 } else { free.min(0.5) };
+            assert!((v - exact).abs() <= tolerance, "{v} for {exact} at {t}: {statistics}");
+            assert!((i + (1.0 - exact) / 1e3).abs() <= tolerance * 1e-3, "{i} at {t}");
+            rows += 1;
+        }
+        assert!(rows >= 5 && statistics.accepted < 2000, "{statistics}");
+    }
+}

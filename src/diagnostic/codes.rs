@@ -187,7 +187,7 @@ pub const CODES: &[Code] = &[
     row("E0801", "no operating point or start", "Newton's method found no values that satisfy all equations, neither directly, nor with conductances at the nodes that are taken away step by step, nor with sources turned up step by step. The message names the equation that is satisfied worst."),
     row("E0802", "step too small", "The step became smaller than rounding allows without reaching the tolerance. A law may have a jump or a pole there, or the solution ends. The message names the equation that is satisfied worst, and why steps were cut."),
     row("E0803", "value is no number", "A law or its slope became infinite or no number. The message names the device; look for a division by 0, or a root or logarithm of a negative value."),
-    row("E0804", "switches do not settle", "No combination of the switches' states agrees with the voltages that it leads to, or a switch changes to and fro at one instant. Give it some hysteresis, or a capacitance at the node that controls it."),
+    row("E0804", "switches do not settle", "No combination of the switches' states agrees with the voltages that it leads to, or a switch changes to and fro at one instant. Give it more hysteresis than its own switching moves its control by, or none at all, or a capacitance at the node that controls it."),
     row("E0805", "singular equations", "At some values the equations have no single solution. The message names what is not determined."),
     row("E0806", "no transient analysis", "The run needs to know how long it is: `.tran step stop` in a netlist, `simulate until 1 s` in a bond graph."),
     row("E0807", "option makes no sense", "The value is outside what the option takes; the message says what that is."),

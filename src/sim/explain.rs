@@ -95,7 +95,7 @@ pub(crate) fn failure(
                 .because(
                     "no combination of the switches' states agrees with the voltages that it leads to",
                 )
-                .help("give the switch some hysteresis, or a capacitance at the node that controls it")
+                .help("give the switch more hysteresis (`vh`, `ih` of its model) than its own switching moves its control by, or none, so that it may stand between on and off; or a capacitance at the node that controls it")
         }
         Trouble::Cut(Cut::NonFinite { device }) => match device {
             Some(device) => {

@@ -569,11 +569,11 @@ fn switches_flip_where_their_control_crosses() {
 
 #[test]
 fn a_switch_that_contradicts_itself_is_named() {
-    // Closing takes the control away at once: 5 V open, 0.05 V closed, no hysteresis to speak of.
+    // Closing takes the control away at once: 5 V open, 0.05 V closed, beyond its hysteresis on either side.
     let switch = DeviceKind::Switch {
         control: volt(2, 0),
         on: 2.5,
-        off: 2.5,
+        off: 2.4,
         on_resistance: 10.0,
         off_resistance: 1e9,
         initially_on: None,

@@ -1,7 +1,9 @@
 //! Switch with two resistances and hysteresis: i = g·v, g = 1/Ron or 1/Roff by a mode.
 //!
 //! The mode becomes 1 when the control (a voltage or a current) rises through its upper threshold and 0 when it falls
-//! through its lower one: the SW and CSW of SPICE3 with Vt ± Vh, It ± Ih (T. Quarles, UCB/ERL M89/42, 1989).
+//! through its lower one: the SW and CSW of SPICE3 with Vt ± Vh, It ± Ih (T. Quarles, UCB/ERL M89/42, 1989). Where both
+//! thresholds are one the switch remembers nothing: on is a condition of its law like any other, along which the
+//! solution may slide.
 
 use super::{Needs, Row};
 use crate::circuit::stamper::{Current, Stamper, voltage};
@@ -15,10 +17,15 @@ pub const ROW: Row = Row {
     name: "switch",
     letters: "SW",
     equation: "i = v / (on ? Ron : Roff)",
-    needs: |_| Needs { mode: true, ..Needs::NOTHING },
+    needs: |kind| Needs { mode: remembers(kind), ..Needs::NOTHING },
     stamp,
     current,
 };
+
+/// Whether its thresholds differ.
+fn remembers(kind: &DeviceKind) -> bool {
+    matches!(kind, DeviceKind::Switch { on, off, .. } if on != off)
+}
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Switch { control, on, off, on_resistance, off_resistance, initially_on } =
@@ -55,13 +62,17 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 }
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
-    let (DeviceKind::Switch { on_resistance, off_resistance, .. }, Some(mode)) =
-        (&stamper.device(id).kind, stamper.mode(id))
+    let DeviceKind::Switch { control, on, on_resistance, off_resistance, .. } =
+        &stamper.device(id).kind
     else {
         return Current::Linear(vec![]);
     };
+    let closed = match stamper.mode(id) {
+        Some(mode) => Law::leaf(Leaf::Mode(mode)),
+        None => stamper.law(control).binary(Binary::GreaterEqual, Law::number(*on)),
+    };
     let (on, off) = (Law::number(1.0 / on_resistance), Law::number(1.0 / off_resistance));
-    let conductance = Law::new(Node::If(Law::leaf(Leaf::Mode(mode)), on, off), Span::NONE);
+    let conductance = Law::new(Node::If(closed, on, off), Span::NONE);
     Current::Law(conductance.binary(Binary::Multiply, voltage(stamper.ends(id))))
 }
 
@@ -94,6 +105,15 @@ mod tests {
         let mode = &stamps.modes[0];
         assert_eq!((mode.on, mode.off, mode.initial), (2.0, 1.0, Some(true)));
         assert_eq!(mode.control, Law::leaf(Leaf::Unknown(UnknownId(2))));
+    }
+
+    #[test]
+    fn without_hysteresis_it_conducts_by_its_control() {
+        let stamps = stamps(vec![("s1", vec![1, 2], switch(2.0, 2.0))]);
+        assert!(stamps.modes.is_empty());
+        let law = &stamps.laws[0].law;
+        assert_eq!(value(law, &[5.0, 1.0, 2.0], &[], &[], 0.0), 8.0);
+        assert_eq!(value(law, &[5.0, 1.0, 1.9], &[], &[], 0.0), 1.0);
     }
 
     #[test]
