@@ -216,6 +216,7 @@ pub(crate) mod testing {
                     Multiply => a * b,
                     Divide => a / b,
                     Less => f64::from(a < b),
+                    GreaterEqual => f64::from(a >= b),
                     other => panic!("no value of {other:?} here"),
                 }
             }
