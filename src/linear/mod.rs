@@ -19,7 +19,7 @@ pub mod symmetric;
 #[cfg(test)]
 mod tests;
 
-pub use field::{Complex, Field, Prime61};
+pub use field::{Complex, Field, Prime, Prime61, Prime62};
 pub use lu::{Lu, SMALL, Trouble, backward_error};
 pub use matching::{Matching, maximum_matching};
 pub use pattern::Pattern;

@@ -57,6 +57,8 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
     let mut expander =
         Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
     let given = definitions(&mut expander.flat, TOP, &netlist.cards, d);
+    expander.flat.scopes.get_mut(TOP).written =
+        given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
     expander.body(TOP, &netlist.cards, d);
     let flat = expander.flat;
@@ -298,6 +300,10 @@ impl<'n> Expander<'n> {
             ..Scope::default()
         });
         let own = definitions(&mut self.flat, inner, &subcircuit.cards, d);
+        let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
+            .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))
+            .chain(own.iter().map(|(name, expr)| (*name, (inner, *expr))));
+        self.flat.scopes.get_mut(inner).written = written.collect();
         let defaults = subcircuit.parameters.iter().map(|(name, expr)| (*name, expr));
         let given: Vec<_> =
             defaults.chain(values.iter().map(|(name, expr)| (*name, expr))).chain(own).collect();

@@ -3,9 +3,9 @@
 //! Two passes. The first walks the cards and the bodies of instances, makes the nodes that devices stand between, and
 //! numbers the devices; the second, when every name is known, says what each device is.
 
-mod scope;
-mod expand;
-mod values;
+pub mod scope;
+pub mod expand;
+pub mod values;
 mod kinds;
 mod sources;
 mod experiment;

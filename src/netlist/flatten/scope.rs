@@ -48,6 +48,8 @@ pub struct Scope<'n> {
     pub parent: Option<ScopeId>,
     /// Parameters as numbers.
     pub parameters: Table<f64>,
+    /// The same as they are written, and the scope whose words they use.
+    pub written: Table<(ScopeId, &'n Expr)>,
     /// Nodes.
     pub nodes: Table<NodeId>,
     /// Devices; of a K with several pairs the first.
