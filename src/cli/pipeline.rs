@@ -441,7 +441,19 @@ pub fn emit(
     }
 }
 
-/// Both routes over one experiment, judged. `adapt` may change how the circuit is run. `Ok(None)` when there were
+/// What `verify` is asked about.
+#[derive(Clone, Debug, Default)]
+pub struct Question {
+    /// A netlist other than the translation's own.
+    pub netlist: Option<FileId>,
+    /// A map of it other than the translation's own, as JSON.
+    pub map: Option<serde_json::Value>,
+    /// What random numbers follow from.
+    pub seed: Option<u64>,
+}
+
+/// The certificate: the text of a netlist against the bond graph, then both routes over one experiment. The text is
+/// written and read back where none is given. `adapt` may change how the circuit is run. `Ok(None)` when there were
 /// errors.
 ///
 /// # Errors
@@ -450,22 +462,31 @@ pub fn verify(
     map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
+    question: &Question,
     d: &mut Vec<Diagnostic>,
     adapt: impl FnOnce(&mut Settings),
 ) -> Result<Option<Report>, FailureKind> {
     let demands = verify::Settings::default();
-    let mut overrides = overrides.clone();
     if language(map, file) != Language::Bond {
         let message = "only a bond graph can be verified";
         d.push(Diagnostic::error("E0944", Span::NONE, message));
         return Ok(None);
     }
-    if !overrides.options.iter().any(|(key, _)| key.eq_ignore_ascii_case("reltol")) {
-        overrides.options.push(("reltol".into(), format!("{:e}", demands.reltol)));
+    let Some(model) = model(map, file, overrides, d) else { return Ok(None) };
+    let Some((certificate, netlist)) = certificate(map, &model, question, d) else {
+        return Ok(None);
+    };
+    if !certificate.holds() || model.graph.experiment.until.is_none() {
+        return Ok(Some(Report::of_text(certificate)));
     }
-    let Some(model) = model(map, file, &overrides, d) else { return Ok(None) };
-    let circuit = model.circuit(d);
-    let run = circuit.and_then(|(circuit, units)| ready(circuit, &units, true, None, d));
+    let circuit = flatten::flatten(&netlist, d).map(|mut circuit| {
+        let given = overrides.options.iter();
+        if !given.clone().any(|(key, _)| key.eq_ignore_ascii_case("reltol")) {
+            circuit.options.push(("reltol".into(), format!("{:e}", demands.reltol)));
+        }
+        circuit
+    });
+    let run = circuit.and_then(|circuit| ready(circuit, &deck_units(&netlist), true, None, d));
     let Some(mut run) = run else { return Ok(None) };
     if let Some(settings) = &mut run.settings {
         adapt(settings);
@@ -477,5 +498,42 @@ pub fn verify(
         }
         return Err(failure.kind);
     }
-    Ok(verify::judge(&model.graph, &model.causality, &trace, &demands, d))
+    let report = verify::judge(&model.graph, &model.causality, &trace, &demands, d);
+    Ok(report.map(|report| report.with(certificate)))
+}
+
+/// The parts of the certificate that look at the text alone, and the netlist that was read from it.
+pub fn certificate(
+    map: &mut SourceMap,
+    model: &Model,
+    question: &Question,
+    d: &mut Vec<Diagnostic>,
+) -> Option<(verify::Certificate, Netlist)> {
+    let text = match question.netlist {
+        Some(file) => file,
+        None => {
+            let text = write::write(&model.translation.netlist);
+            map.add(format!("{}.cir", model.graph.name), text)
+        }
+    };
+    let netlist = read::read(map, text, d);
+    if has_errors(d) {
+        return None;
+    }
+    let mut translation = model.translation.clone();
+    if let Some(json) = &question.map {
+        match translate::Map::from_json(json, &mut translation.netlist.names) {
+            Some(map) => {
+                translation.map = translate::Map { parameters: translation.map.parameters, ..map }
+            }
+            None => {
+                let message = "this is no map as `convert --map` writes it";
+                d.push(Diagnostic::error("E0944", Span::NONE, message));
+                return None;
+            }
+        }
+    }
+    let seed = question.seed.unwrap_or(verify::SEED);
+    let found = verify::certify(&model.graph, &model.initial, &translation, &netlist, seed, d)?;
+    Some((found, netlist))
 }

@@ -1,8 +1,9 @@
-//! `bondspice verify MODEL.bg`: the circuit's run against the bond graph's own equations, and the balance of energy.
+//! `bondspice verify MODEL.bg`: the certificate of a netlist's text, the circuit's run against the bond graph's own
+//! equations, and the balance of energy.
 
 use super::flags::ReportFlags;
 use super::output::write_text;
-use super::pipeline;
+use super::pipeline::{self, Question};
 use super::session::{Exit, Session};
 use super::watch::{self, Bar};
 use crate::bond::elaborate::Overrides;
@@ -12,14 +13,32 @@ use crate::verify::Report;
 use std::sync::Arc;
 
 /// What it does, in a line.
-pub const ABOUT: &str = "Check a translation by a second route without a circuit: 0 right, 1 not";
+pub const ABOUT: &str = "Prove a netlist against its bond graph: 0 right, 1 not";
 
 /// An example for the help.
-pub const EXAMPLE: &str = "The bond graph's own equations are integrated without any circuit and compared with the \
-netlist's transient; the energy balance must close.\n\nExample: bondspice verify model.bg --format json";
+pub const EXAMPLE: &str = "The netlist's text is read back and its equations are solved exactly, over prime fields with random \
+parameters, beside those of the bond graph; laws, values and waveforms are compared; then both are simulated, and the \
+energy balance must close.\n\nExample: bondspice verify model.bg --format json\n         \
+bondspice verify model.bg --netlist edited.cir";
 
 /// Its flags.
-pub type Arguments = ReportFlags;
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    report: ReportFlags,
+    /// A netlist to check instead of the bond graph's own
+    #[arg(long, value_name = "FILE")]
+    netlist: Option<String>,
+    /// The dialect of that netlist: ngspice
+    #[arg(long, value_name = "DIALECT", value_parser = ["ngspice"], default_value = "ngspice")]
+    dialect: String,
+    /// The map of that netlist, as `convert --map` writes it; the bond graph's own map without it
+    #[arg(long, value_name = "FILE", requires = "netlist")]
+    map: Option<String>,
+    /// What the random numbers follow from
+    #[arg(long, value_name = "NUMBER")]
+    seed: Option<u64>,
+}
 
 /// Verifies.
 pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
@@ -29,30 +48,48 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 }
 
 fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
-    let overrides = arguments.model.overrides(session)?;
-    let file = session.load(&arguments.file)?;
-    let report = report(file, &overrides, session)?;
-    let text = match arguments.format.as_str() {
+    let flags = &arguments.report;
+    let overrides = flags.model.overrides(session)?;
+    let file = session.load(&flags.file)?;
+    let netlist = arguments.netlist.as_deref().map(|path| session.load(path)).transpose()?;
+    let map = match arguments.map.as_deref() {
+        Some(path) => {
+            let file = session.load(path)?;
+            let text = session.map.file(file).map_or("", |file| file.text.as_str());
+            // What is no JSON is no map, which is said where it is read.
+            Some(serde_json::from_str(text).unwrap_or_default())
+        }
+        None => None,
+    };
+    let question = Question { netlist, map, seed: arguments.seed };
+    let report = report(file, &overrides, &question, session)?;
+    let text = match flags.format.as_str() {
         "json" => format!("{}\n", report.json()),
         _ => report.text(),
     };
-    write_text(arguments.output.as_deref(), &text, session)?;
+    write_text(flags.output.as_deref(), &text, session)?;
     Ok(match session.exit() {
         Exit::Fine if !report.passes() => Exit::Negative,
         exit => exit,
     })
 }
 
-fn report(file: FileId, overrides: &Overrides, session: &mut Session) -> Result<Report, Exit> {
+fn report(
+    file: FileId,
+    overrides: &Overrides,
+    question: &Question,
+    session: &mut Session,
+) -> Result<Report, Exit> {
     let mut d = vec![];
     let bar = Bar::new(session.global.quiet);
     let progress = bar.clone();
-    let report = pipeline::verify(&mut session.map, file, overrides, &mut d, |settings| {
-        settings.interrupt = Some(watch::stop_flag());
-        if let Some(bar) = progress {
-            settings.progress = Some(Arc::new(move |part| bar.show(part)));
-        }
-    });
+    let report =
+        pipeline::verify(&mut session.map, file, overrides, question, &mut d, |settings| {
+            settings.interrupt = Some(watch::stop_flag());
+            if let Some(bar) = progress {
+                settings.progress = Some(Arc::new(move |part| bar.show(part)));
+            }
+        });
     if let Some(bar) = bar {
         bar.clear();
     }

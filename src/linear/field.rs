@@ -283,7 +283,8 @@ mod tests {
             for _ in 0..100 {
                 x = x * x + edge;
                 let y = x + x.pow(3);
-                let product = (u128::from(x.value()) * u128::from(y.value()) % u128::from(p)) as u64;
+                let product =
+                    (u128::from(x.value()) * u128::from(y.value()) % u128::from(p)) as u64;
                 assert_eq!((x * y).value(), product);
                 let inverse = y.inverse().unwrap();
                 assert_eq!(y * inverse, Prime::ONE);

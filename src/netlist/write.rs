@@ -40,6 +40,11 @@ pub fn expression(names: &Names, expr: &Expr) -> String {
     })
 }
 
+/// A card that holds no others, on one line.
+pub fn card(names: &Names, kind: &CardKind) -> String {
+    words(names, kind).join(" ")
+}
+
 fn cards(text: &mut String, names: &Names, cards: &[Card]) {
     for card in cards {
         match &card.kind {

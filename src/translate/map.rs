@@ -5,9 +5,11 @@ use super::names::Renamed;
 use super::values::Speaker;
 use crate::bond::graph::{self, BondId, Law, Power, SignalOrigin, Storage};
 use crate::expr::{Binary, Node, Unary};
+use crate::netlist::read::expression::expression as expression_of;
 use crate::netlist::write::expression;
 use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
 use crate::quantity::Domain;
+use crate::source::FileId;
 use std::collections::HashMap;
 
 /// The map of a translation.
@@ -134,6 +136,56 @@ impl Map {
             "renamed": renamed,
             "figures": { "nodes": nodes, "devices": devices, "helpers": helpers },
         })
+    }
+}
+
+impl Map {
+    /// A map from its JSON, its expressions in the names given. What holds the value of a parameter, which stands there
+    /// as a number, is left without an expression. `None` for anything else.
+    pub fn from_json(json: &serde_json::Value, names: &mut Names) -> Option<Map> {
+        let text =
+            |value: &serde_json::Value, key: &str| Some(value.get(key)?.as_str()?.to_string());
+        let variables = json.get("variables")?.as_array()?.iter().map(|variable| {
+            let written = text(variable, "expr")?;
+            let read = expression_of(&written, names, FileId(u32::MAX), 0, &mut vec![]);
+            let unit = text(variable, "unit")?;
+            Some(Variable {
+                bg: text(variable, "bg")?,
+                expr: read.filter(|expr| !holds_number(expr)),
+                factor: variable.get("factor")?.as_f64()?,
+                unit,
+                domain: Domain::Any,
+                observed: variable.get("observed")?.as_bool()?,
+            })
+        });
+        let variables = variables.collect::<Option<Vec<_>>>()?;
+        let cards = json.get("cards")?.as_array()?.iter().map(|card| {
+            let (bond, line) = (text(card, "bond"), card.get("line").and_then(|l| l.as_u64()));
+            let line = line.map(|line| line as usize);
+            Some(MapCard { card: text(card, "card")?, element: text(card, "element")?, bond, line })
+        });
+        let cards = cards.collect::<Option<Vec<_>>>()?;
+        let figures = Figures::default();
+        Some(Map {
+            dialect: "ngspice",
+            variables,
+            cards,
+            parameters: vec![],
+            renamed: vec![],
+            figures,
+        })
+    }
+}
+
+/// Whether a number stands in an expression.
+fn holds_number(expr: &Expr) -> bool {
+    match &*expr.node {
+        Node::Number(_) | Node::Table(..) => true,
+        Node::Leaf(_) => false,
+        Node::Unary(_, a) => holds_number(a),
+        Node::Binary(_, a, b) => holds_number(a) || holds_number(b),
+        Node::Call(_, arguments) => arguments.iter().any(holds_number),
+        Node::If(c, a, b) => [c, a, b].into_iter().any(holds_number),
     }
 }
 

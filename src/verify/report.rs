@@ -1,8 +1,14 @@
 //! The report of `verify`: a short table and JSON.
 
+use super::certificate::Certificate;
+use super::exact::text::Text;
 use crate::second::energy::{Energy, Role};
+use crate::source::Span;
 use serde::Serialize;
 use std::fmt::Write;
+
+/// Differences that a table shows.
+const MOST_LINES: usize = 20;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -11,10 +17,103 @@ pub struct Report {
     pub schema: u32,
     /// `pass` or `fail`.
     pub verdict: &'static str,
-    /// Every observed variable on both routes.
+    /// The exact part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exact: Option<Exact>,
+    /// Laws and signals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub laws: Option<Laws>,
+    /// Values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub values: Option<Values>,
+    /// Every observed variable on both routes; none where the text alone is found to be wrong.
     pub trajectories: Vec<Trajectory>,
-    /// The balance.
-    pub energy: EnergyReport,
+    /// The balance, where there was a run.
+    pub energy: Option<EnergyReport>,
+}
+
+/// Something that differs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mismatch {
+    /// The variable, parameter or kind of card; empty where a card says enough.
+    pub variable: String,
+    /// The card, where one can be named.
+    pub card: Option<String>,
+    /// What differs.
+    pub message: String,
+    /// Where the card stands.
+    #[serde(skip)]
+    pub span: Span,
+}
+
+impl Mismatch {
+    /// Of a variable.
+    pub fn of(variable: &str, message: &str) -> Mismatch {
+        let (variable, message) = (variable.to_string(), message.to_string());
+        Mismatch { variable, card: None, message, span: Span::NONE }
+    }
+
+    /// Of a device of a text.
+    pub fn card(text: &Text<'_>, device: usize, message: &str) -> Mismatch {
+        Mismatch {
+            variable: String::new(),
+            card: Some(text.device_name(device)),
+            message: message.to_string(),
+            span: text.circuit.devices.get(device).map_or(Span::NONE, |device| device.span),
+        }
+    }
+
+    /// In a line.
+    pub fn line(&self) -> String {
+        let card = self.card.as_deref().map(|card| format!("`{card}`"));
+        let what = [Some(self.variable.clone()).filter(|v| !v.is_empty()), card];
+        let what: Vec<String> = what.into_iter().flatten().collect();
+        format!("{}: {}", what.join(", "), self.message)
+    }
+}
+
+/// The exact part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Exact {
+    /// `pass` or `fail`.
+    pub verdict: &'static str,
+    /// What the random numbers follow from.
+    pub seed: u64,
+    /// Draws, each over a prime field of its own.
+    pub draws: usize,
+    /// Unknowns of both systems.
+    pub unknowns: usize,
+    /// Variables that were compared in each draw.
+    pub variables: usize,
+    /// That a wrong text passes all draws, at most.
+    pub probability: f64,
+    /// What differs.
+    pub mismatches: Vec<Mismatch>,
+    /// What the bond graph itself leaves undetermined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub singular: Option<String>,
+}
+
+/// Laws and signals.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Laws {
+    /// `pass` or `fail`.
+    pub verdict: &'static str,
+    /// Texts that were compared with their laws.
+    pub laws: usize,
+    /// What differs.
+    pub mismatches: Vec<Mismatch>,
+}
+
+/// Values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Values {
+    /// `pass` or `fail`.
+    pub verdict: &'static str,
+    /// Values that were compared.
+    pub compared: usize,
+    /// What differs.
+    pub mismatches: Vec<Mismatch>,
 }
 
 /// One observed variable on both routes.
@@ -79,9 +178,75 @@ impl Report {
         serde_json::to_value(self).unwrap_or(serde_json::Value::Null)
     }
 
+    /// A report of the text alone.
+    pub fn of_text(certificate: Certificate) -> Report {
+        let verdict = if certificate.holds() { "pass" } else { "fail" };
+        let report = Report {
+            schema: 1,
+            verdict,
+            exact: None,
+            laws: None,
+            values: None,
+            trajectories: vec![],
+            energy: None,
+        };
+        report.with(certificate)
+    }
+
+    /// The same with what was found in the text.
+    pub fn with(mut self, certificate: Certificate) -> Report {
+        if !certificate.holds() {
+            self.verdict = "fail";
+        }
+        let Certificate { exact, laws, values } = certificate;
+        (self.exact, self.laws, self.values) = (Some(exact), Some(laws), Some(values));
+        self
+    }
+
+    /// What the parts that look at the text found wrong, the most telling first.
+    pub fn mismatches(&self) -> impl Iterator<Item = &Mismatch> {
+        let laws = self.laws.iter().flat_map(|part| &part.mismatches);
+        let exact = self.exact.iter().flat_map(|part| &part.mismatches);
+        laws.chain(exact).chain(self.values.iter().flat_map(|part| &part.mismatches))
+    }
+
+    /// The parts that look at the text, a line each, and what they found.
+    fn text_parts(&self) -> String {
+        let mut text = String::new();
+        let (Some(exact), Some(laws), Some(values)) = (&self.exact, &self.laws, &self.values)
+        else {
+            return text;
+        };
+        let _ = writeln!(
+            text,
+            "exact    {}  {} variables in {} unknowns, {} draws, wrong with probability < {:.0e}",
+            exact.verdict, exact.variables, exact.unknowns, exact.draws, exact.probability
+        );
+        let _ =
+            writeln!(text, "laws     {}  {} texts of laws and signals", laws.verdict, laws.laws);
+        let _ = writeln!(text, "values   {}  {} values", values.verdict, values.compared);
+        for mismatch in self.mismatches().take(MOST_LINES) {
+            let _ = writeln!(text, "  {}", mismatch.line());
+        }
+        let more = self.mismatches().count().saturating_sub(MOST_LINES);
+        if more > 0 {
+            let _ = writeln!(text, "  and {more} more");
+        }
+        let _ = writeln!(text);
+        text
+    }
+
     /// The report as a table.
     pub fn text(&self) -> String {
-        let mut text = String::new();
+        let mut text = self.text_parts();
+        let Some(e) = &self.energy else {
+            let first = self.mismatches().next().map(Mismatch::line);
+            let _ = match first {
+                Some(first) => writeln!(text, "fail: {first}"),
+                None => writeln!(text, "{}", self.verdict),
+            };
+            return text;
+        };
         let width =
             self.trajectories.iter().map(|t| t.name.chars().count()).max().unwrap_or(0).max(8);
         let _ = writeln!(text, "{:width$}  {:>9}  {:>9}  {:>12}", "variable", "max", "rms", "at");
@@ -94,7 +259,6 @@ impl Report {
                 t.name, t.max, t.rms
             );
         }
-        let e = &self.energy;
         let _ = writeln!(text);
         for (name, value) in [
             ("energy in", e.delivered),

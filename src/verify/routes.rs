@@ -88,7 +88,9 @@ pub fn judge(
     let energy = EnergyReport::of(&run.energy, settings.energy);
     let passes = energy.holds() && trajectories.iter().all(Trajectory::holds);
     let verdict = if passes { "pass" } else { "fail" };
-    Some(Report { schema: 1, verdict, trajectories, energy })
+    let energy = Some(energy);
+    let (exact, laws, values) = (None, None, None);
+    Some(Report { schema: 1, verdict, exact, laws, values, trajectories, energy })
 }
 
 /// Differences of each column, in parts of its range on the second route.

@@ -1,0 +1,612 @@
+//! The bond graph's own equations over a prime field: an effort and a flow for each bond, straight from the definitions
+//! of the elements, Laplace-transformed.
+//!
+//! ```text
+//! junction   the common variable is equal on all bonds, Σ ± of the other is 0
+//! C, I       s·q − q0 = f,  s·p − p0 = e        q = C·e,  p = I·f
+//! rate form  s·e − e0 = rate
+//! TF, GY     e1 = r·e2, f2 = r·f1               e1 = r·f2, e2 = r·f1
+//! delay      y = θ·x + (1 − θ)/s·y0             θ stands for exp(−s·T)
+//! ```
+//!
+//! A law that is not affine in the unknowns is cut: its value becomes α + β·x, x being its port's own variable; a
+//! modulus becomes a number, and so does a signal. Signs are those of [`graph`](crate::bond::graph).
+
+use super::draw::{Draw, Modular, Of, decimal};
+use super::form::{Form, Reading, Trouble};
+use super::system::{System, Undetermined};
+use crate::bond::graph::{
+    BondGraph, BondId, Dissipation, End, Expr, Field, Law, Leaf, Memory, Modulus, ParameterId,
+    Power, SignalId, SignalLaw, Storage, StoreLaw, Variable, VertexId,
+};
+use crate::expr::Binary;
+use crate::source::Span;
+use std::collections::HashMap;
+
+/// Whose law is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// A port's.
+    Port(End),
+    /// A signal's: its value, its rate, or what it remembers.
+    Signal(SignalId),
+}
+
+/// A variable that a cut law follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Follows {
+    /// A power variable of a port; a flow counted into the element.
+    Port(End, Power),
+    /// What a port stores.
+    Stored(End),
+    /// Nothing.
+    Nothing,
+}
+
+/// A law that is cut: its value is offset + slope·(what it follows).
+#[derive(Clone, Debug)]
+pub struct Cut<F> {
+    /// Its value at 0.
+    pub offset: F,
+    /// By what it follows.
+    pub slope: F,
+    /// What it follows.
+    pub follows: Follows,
+    /// The same in the unknowns.
+    pub value: Form<F>,
+    /// The law.
+    pub law: Expr,
+    /// The element whose own variables it speaks of.
+    pub own: Option<VertexId>,
+}
+
+/// The equations of a graph.
+pub struct Bonds<'g, F> {
+    /// The graph.
+    pub graph: &'g BondGraph,
+    /// The draw.
+    pub draw: Draw,
+    /// By parameter.
+    pub parameters: Vec<F>,
+    /// The equations.
+    pub system: System<F>,
+    /// Where each equation comes from.
+    origins: Vec<Place>,
+    /// Laws that are cut.
+    pub cuts: HashMap<Place, Cut<F>>,
+    /// Moduli that are cut, and what to.
+    moduli: Vec<(Expr, VertexId, F)>,
+    /// By vertex and port: the unknown that it stores.
+    stored: HashMap<End, u32>,
+    /// By signal: its unknown. Waveforms have one too, so that a product of two is no number on either side.
+    signals: Vec<u32>,
+    /// s
+    pub s: F,
+}
+
+/// Whether the ports of a field are inertias whose matrix is constant: coupled inductors hold it.
+pub fn constant_inertias(field: &Field) -> bool {
+    let inertia = |law: &Law| matches!(law, Law::Store { kind: Storage::Inertia, .. });
+    let constant = |expr: &Expr| {
+        let mut constant = true;
+        expr.leaves(&mut |leaf, _| constant &= matches!(leaf, Leaf::Parameter(_)));
+        constant
+    };
+    field.ports.iter().all(inertia)
+        && field.matrix.as_ref().is_some_and(|rows| rows.iter().flatten().all(constant))
+}
+
+/// Random values of parameters, those that others define following from these; literals where `literal` says so.
+///
+/// # Errors
+/// What has no value.
+pub fn parameters<F: Modular>(
+    graph: &BondGraph,
+    draw: Draw,
+    literal: &[bool],
+) -> Result<Vec<F>, Trouble> {
+    let count = graph.parameters.len();
+    let mut values: Vec<Option<F>> = vec![None; count];
+    let reading = Reading { draw, cut: None };
+    for first in 0..count {
+        let mut open = vec![first];
+        while let Some(&k) = open.last() {
+            if values[k].is_some() {
+                open.pop();
+                continue;
+            }
+            let expr = &graph.parameters[k].expr;
+            let (mut others, mut missing) = (0, None);
+            expr.leaves(&mut |leaf, _| {
+                if let Leaf::Parameter(ParameterId(id)) = leaf {
+                    others += 1;
+                    if values[*id as usize].is_none() {
+                        missing = Some(*id as usize);
+                    }
+                }
+            });
+            if literal.get(k) == Some(&true) {
+                let value = graph.parameters[k].value;
+                values[k] =
+                    Some(decimal(value).ok_or_else(|| Trouble::Unknown(value.to_string()))?);
+            } else if others == 0 {
+                let root: F = draw.of(Of::Parameter(k));
+                values[k] = Some(root * root);
+            } else if let Some(missing) = missing.filter(|_| open.len() <= count) {
+                open.push(missing);
+                continue;
+            } else {
+                values[k] = Some(reading.number(expr, &mut |leaf, _| {
+                    match leaf {
+                        Leaf::Parameter(ParameterId(id)) => values[*id as usize]
+                            .map(Form::number)
+                            .ok_or(Trouble::Unknown(graph.parameters[k].name.clone())),
+                        _ => Err(Trouble::Nonlinear),
+                    }
+                })?);
+            }
+            open.pop();
+        }
+    }
+    Ok(values.into_iter().flatten().collect())
+}
+
+impl<'g, F: Modular> Bonds<'g, F> {
+    /// The equations of a graph in one draw.
+    ///
+    /// # Errors
+    /// What has no value in it.
+    pub fn new(graph: &'g BondGraph, draw: Draw, literal: &[bool]) -> Result<Self, Trouble> {
+        let mut bonds = Bonds {
+            graph,
+            draw,
+            parameters: parameters(graph, draw, literal)?,
+            system: System { unknowns: 2 * graph.bonds.len(), rows: vec![] },
+            origins: vec![],
+            cuts: HashMap::new(),
+            moduli: vec![],
+            stored: HashMap::new(),
+            signals: vec![],
+            s: draw.of(Of::S),
+        };
+        bonds.signals = graph.signals.iter().map(|_| bonds.system.add()).collect();
+        for (end, _) in graph.stores() {
+            if let Law::Store { law, .. } = graph.law_at(end)
+                && !matches!(law, StoreLaw::Linear(size) if bonds.is_number(size))
+            {
+                let column = bonds.system.add();
+                bonds.stored.insert(end, column);
+            }
+        }
+        for id in graph.vertex_ids() {
+            bonds.element(id)?;
+        }
+        for index in 0..graph.signals.len() {
+            bonds.signal_rows(SignalId(index as u32))?;
+        }
+        Ok(bonds)
+    }
+
+    fn is_number(&self, expr: &Expr) -> bool {
+        let mut constant = true;
+        expr.leaves(&mut |leaf, _| constant &= matches!(leaf, Leaf::Parameter(_)));
+        constant
+    }
+
+    /// The form of a bond's power variable along its half arrow.
+    pub fn power(&self, bond: BondId, power: Power) -> Form<F> {
+        let of_flow = u32::from(power == Power::Flow);
+        Form::unknown(2 * bond.0 + of_flow)
+    }
+
+    /// A power variable at a port, the flow counted into the element.
+    pub fn at(&self, end: End, power: Power) -> Form<F> {
+        let Some(bond) = self.graph.bond_at(end) else { return Form::number(F::ZERO) };
+        let form = self.power(bond, power);
+        let outward = self.graph.sign_into(bond, end.vertex, end.port) < 0.0;
+        if power == Power::Flow && outward { form.times(-F::ONE) } else { form }
+    }
+
+    /// What a port stores.
+    ///
+    /// # Errors
+    /// Why it has no form.
+    pub fn stored(&self, end: End) -> Result<Form<F>, Trouble> {
+        if let Some(column) = self.stored.get(&end) {
+            return Ok(Form::unknown(*column));
+        }
+        match self.graph.law_at(end) {
+            Law::Store { kind, law: StoreLaw::Linear(size), .. } => {
+                let size = self.constant(size)?;
+                Ok(self.at(end, kind.gives()).times(size))
+            }
+            // What a rate form stores is counted from its start: s·q − q0 = f.
+            Law::Rate { kind, .. } => {
+                let start: F = self.draw.of(Of::InitialStored(end.vertex.0, end.port));
+                let integral = self.at(end, kind.integrates()).plus(start, &Form::number(F::ONE));
+                Ok(integral.times(F::ONE / self.s))
+            }
+            _ => Err(Trouble::Unknown(self.graph.port_name(end))),
+        }
+    }
+
+    /// A signal.
+    pub fn signal(&self, id: SignalId) -> Form<F> {
+        self.signals.get(id.index()).map_or(Form::number(F::ZERO), |column| Form::unknown(*column))
+    }
+
+    /// What a leaf of an expression is.
+    ///
+    /// # Errors
+    /// Why it has no form.
+    pub fn leaf(&self, leaf: &Leaf, own: Option<VertexId>) -> Result<Form<F>, Trouble> {
+        let nobody = || Trouble::Unknown("an own variable of no element".to_string());
+        match leaf {
+            Leaf::Parameter(id) => self
+                .parameters
+                .get(id.index())
+                .map(|value| Form::number(*value))
+                .ok_or_else(|| Trouble::Unknown(format!("parameter {}", id.0))),
+            Leaf::Signal(id) => Ok(self.signal(*id)),
+            Leaf::Time => Ok(Form::number(self.draw.of(Of::Time))),
+            Leaf::Own(Variable::Power(power)) => {
+                Ok(self.at(End::only(own.ok_or_else(nobody)?), *power))
+            }
+            Leaf::Own(Variable::Stored) => self.stored(End::only(own.ok_or_else(nobody)?)),
+            Leaf::Bond { bond, variable, negated } => {
+                let form = self.power(*bond, *variable);
+                Ok(if *negated { form.times(-F::ONE) } else { form })
+            }
+            Leaf::Stored(end) => self.stored(*end),
+        }
+    }
+
+    fn reading(&self) -> Reading<'_, F> {
+        Reading { draw: self.draw, cut: None }
+    }
+
+    fn form(&self, expr: &Expr, own: Option<VertexId>) -> Result<Form<F>, Trouble> {
+        self.reading().form(expr, &mut |leaf, _: Span| self.leaf(leaf, own))
+    }
+
+    fn constant(&self, expr: &Expr) -> Result<F, Trouble> {
+        self.reading().number(expr, &mut |leaf, _| self.leaf(leaf, None))
+    }
+
+    fn row(&mut self, origin: Place, form: Form<F>) {
+        self.system.rows.push(form);
+        self.origins.push(origin);
+    }
+
+    /// The value of a law at a port: its form, or what it is cut to.
+    fn law(&mut self, end: End, law: Expr, follows: Follows) -> Result<Form<F>, Trouble> {
+        let own = Some(end.vertex);
+        match self.form(&law, own) {
+            Err(Trouble::Nonlinear) => {}
+            found => return found,
+        }
+        let (vertex, port) = (end.vertex.0, end.port);
+        let offset: F = self.draw.of(Of::Offset(vertex, port));
+        let (slope, followed): (F, _) = match follows {
+            Follows::Nothing => (F::ZERO, Form::number(F::ZERO)),
+            Follows::Stored(end) => (self.draw.of(Of::Slope(vertex, port)), self.stored(end)?),
+            Follows::Port(end, power) => {
+                (self.draw.of(Of::Slope(vertex, port)), self.at(end, power))
+            }
+        };
+        let value = followed.times(slope).plus(offset, &Form::number(F::ONE));
+        let cut = Cut { offset, slope, follows, value: value.clone(), law, own };
+        self.cuts.insert(Place::Port(end), cut);
+        Ok(value)
+    }
+
+    /// The rows of one junction or element.
+    fn element(&mut self, id: VertexId) -> Result<(), Trouble> {
+        let graph = self.graph;
+        match &graph.vertex(id).law {
+            Law::Zero => self.junction(id, Power::Effort),
+            Law::One => self.junction(id, Power::Flow),
+            Law::Transformer(modulus) => self.two_port(id, modulus, false)?,
+            Law::Gyrator(modulus) => self.two_port(id, modulus, true)?,
+            _ => {
+                for end in graph.law_ports(id) {
+                    self.port(end)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn junction(&mut self, id: VertexId, common: Power) {
+        let place = Place::Port(End::only(id));
+        let bonds = &self.graph.vertex(id).bonds;
+        let Some((first, rest)) = bonds.split_first() else { return };
+        for bond in rest {
+            let form = self.power(*bond, common).minus(&self.power(*first, common));
+            self.row(place, form);
+        }
+        let mut sum = Form::number(F::ZERO);
+        for bond in bonds {
+            let into = self.graph.sign_into(*bond, id, 0) > 0.0;
+            sum = sum.plus(if into { F::ONE } else { -F::ONE }, &self.power(*bond, common.dual()));
+        }
+        self.row(place, sum);
+    }
+
+    /// Power variables of port 0 counted into, those of port 1 out of the element.
+    fn two_port(&mut self, id: VertexId, modulus: &Modulus, gyrates: bool) -> Result<(), Trouble> {
+        let ends = [0, 1].map(|port| End { vertex: id, port });
+        let [Some(first), Some(second)] = ends.map(|end| self.graph.bond_at(end)) else {
+            return Ok(());
+        };
+        // (port whose variable the modulus gives, which; port of what it multiplies, which).
+        use Power::{Effort, Flow};
+        let (value, rows) = match (modulus, gyrates) {
+            (Modulus::Ratio(r), false) => (r, [(0, Effort, 1, Effort), (1, Flow, 0, Flow)]),
+            (Modulus::Gain(g), false) => (g, [(1, Effort, 0, Effort), (0, Flow, 1, Flow)]),
+            (Modulus::Ratio(r), true) => (r, [(0, Effort, 1, Flow), (1, Effort, 0, Flow)]),
+            (Modulus::Gain(g), true) => (g, [(0, Flow, 1, Effort), (1, Flow, 0, Effort)]),
+        };
+        let known = match self.form(value, Some(id)) {
+            Ok(form) => form.as_number(),
+            Err(Trouble::Nonlinear) => None,
+            Err(trouble) => return Err(trouble),
+        };
+        let number: F = known.unwrap_or_else(|| self.draw.of(Of::Slope(id.0, 2)));
+        if known.is_none() {
+            self.moduli.push((value.clone(), id, number));
+        }
+        // The variable of a port as the definition counts it, and as a leaf.
+        let counted = |all: &Self, port: usize, power: Power| {
+            let form = all.at(ends[port], power);
+            if port == 1 && power == Flow { form.times(-F::ONE) } else { form }
+        };
+        for (given, given_power, other, other_power) in rows {
+            let left = counted(self, given, given_power);
+            let right = counted(self, other, other_power);
+            let row = left.minus(&right.clone().times(number));
+            let end = ends[given];
+            self.row(Place::Port(end), row);
+            if known.is_none() {
+                // In a circuit the law of a port gives the effort, or the flow into it.
+                let negative = given == 1 && given_power == Flow;
+                let bond = if other == 0 { first } else { second };
+                let inward = self.graph.sign_into(bond, id, other as u32) > 0.0;
+                let counted_along = if other_power == Flow { inward == (other == 0) } else { true };
+                let leaf = Expr::leaf(Leaf::Bond {
+                    bond,
+                    variable: other_power,
+                    negated: !counted_along ^ negative,
+                });
+                let slope = if negative { -number } else { number };
+                // What is followed is counted into the element.
+                let turned = other == 1 && other_power == Flow;
+                let cut = Cut {
+                    offset: F::ZERO,
+                    slope: if turned { -slope } else { slope },
+                    follows: Follows::Port(ends[other], other_power),
+                    value: right.times(slope),
+                    law: value.clone().binary(Binary::Multiply, leaf),
+                    own: Some(id),
+                };
+                self.cuts.insert(Place::Port(end), cut);
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of a one-port, or of one port of a field.
+    fn port(&mut self, end: End) -> Result<(), Trouble> {
+        let graph = self.graph;
+        let Some(bond) = graph.bond_at(end) else { return Ok(()) };
+        let place = Place::Port(end);
+        let (vertex, port) = (end.vertex.0, end.port);
+        let own = |power| Expr::leaf(Leaf::Own(Variable::Power(power)));
+        match graph.law_at(end) {
+            Law::Source { sets, value, .. } => {
+                let value = self.law(end, value.clone(), Follows::Nothing)?;
+                let row = self.power(bond, *sets).minus(&value);
+                self.row(place, row);
+            }
+            Law::Dissipator(law) => {
+                let (gives, law) = match law {
+                    Dissipation::Linear(resistance) => {
+                        let law = resistance.clone().binary(Binary::Multiply, own(Power::Flow));
+                        (Power::Effort, law)
+                    }
+                    Dissipation::Effort(law) => (Power::Effort, law.clone()),
+                    Dissipation::Flow(law) => (Power::Flow, law.clone()),
+                };
+                let value = self.law(end, law, Follows::Port(end, gives.dual()))?;
+                let row = self.at(end, gives).minus(&value);
+                self.row(place, row);
+            }
+            Law::Store { kind, law, .. } => {
+                let start = match law {
+                    StoreLaw::Linear(size) if self.is_number(size) => {
+                        let power: F = self.draw.of(Of::InitialPower(vertex, port));
+                        self.constant(size)? * power
+                    }
+                    StoreLaw::Linear(size) => {
+                        let stored = Expr::leaf(Leaf::Own(Variable::Stored));
+                        let law = stored.binary(Binary::Divide, size.clone());
+                        self.gives(end, *kind, law)?
+                    }
+                    StoreLaw::OfStored(law) => self.gives(end, *kind, law.clone())?,
+                    StoreLaw::OfPower(law) => {
+                        let follows = Follows::Port(end, kind.gives());
+                        let value = self.law(end, law.clone(), follows)?;
+                        let row = self.stored(end)?.minus(&value);
+                        self.row(place, row);
+                        self.start_of_power(end, law)?
+                    }
+                };
+                let rate = self.at(end, kind.integrates());
+                let row = self.stored(end)?.times(self.s).minus(&Form::number(start)).minus(&rate);
+                self.row(place, row);
+            }
+            Law::Rate { kind, rate, .. } => {
+                let follows = Follows::Port(end, kind.integrates());
+                let rate = self.law(end, rate.clone(), follows)?;
+                let start: F = self.draw.of(Of::InitialPower(vertex, port));
+                let state = self.at(end, kind.gives()).times(self.s);
+                self.row(place, state.minus(&Form::number(start)).minus(&rate));
+            }
+            Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_) => {}
+        }
+        Ok(())
+    }
+
+    /// The row of a store whose law gives its power variable; what it starts from.
+    fn gives(&mut self, end: End, kind: Storage, law: Expr) -> Result<F, Trouble> {
+        let value = self.law(end, law, Follows::Stored(end))?;
+        let row = self.at(end, kind.gives()).minus(&value);
+        self.row(Place::Port(end), row);
+        Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)))
+    }
+
+    /// What a store with a law of its power variable starts from. Coupled inductors start from their currents.
+    fn start_of_power(&self, end: End, law: &Expr) -> Result<F, Trouble> {
+        let coupled = match &self.graph.vertex(end.vertex).law {
+            Law::Field(field) => constant_inertias(field),
+            _ => false,
+        };
+        if !coupled {
+            return Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)));
+        }
+        self.reading().number(law, &mut |leaf, _| match leaf {
+            Leaf::Bond { bond, negated, .. } => {
+                let bonds = &self.graph.vertex(end.vertex).bonds;
+                let port = bonds.iter().position(|b| b == bond).unwrap_or(0) as u32;
+                let power: F = self.draw.of(Of::InitialPower(end.vertex.0, port));
+                let outward = self.graph.sign_into(*bond, end.vertex, port) < 0.0;
+                Ok(Form::number(if outward != *negated { -power } else { power }))
+            }
+            leaf => self.leaf(leaf, Some(end.vertex)),
+        })
+    }
+
+    fn signal_rows(&mut self, id: SignalId) -> Result<(), Trouble> {
+        let graph = self.graph;
+        let own = self.signal(id);
+        let place = Place::Signal(id);
+        let row = match &graph.signals[id.index()].law {
+            SignalLaw::Waveform(_) => {
+                own.minus(&Form::number(self.draw.of(Of::Waveform(id.index()))))
+            }
+            SignalLaw::Algebraic(value) => own.minus(&self.signal_law(id, value)?),
+            SignalLaw::Integrator { rate, .. } => {
+                let start: F = self.draw.of(Of::InitialSignal(id.index()));
+                let rate = self.signal_law(id, rate)?;
+                own.times(self.s).minus(&Form::number(start)).minus(&rate)
+            }
+            SignalLaw::Memory { kind: Memory::Delay { by }, input } => {
+                let input = self.signal_law(id, input)?;
+                let delayed = self.delayed(by)?;
+                let start: F = self.draw.of(Of::InitialSignal(id.index()));
+                let before = (F::ONE - delayed) / self.s * start;
+                own.minus(&input.times(delayed)).minus(&Form::number(before))
+            }
+            SignalLaw::Memory { input, .. } => {
+                self.signal_law(id, input)?;
+                own.minus(&Form::number(self.draw.of(Of::Remembered(id.index()))))
+            }
+        };
+        self.row(place, row);
+        Ok(())
+    }
+
+    /// exp(−s·T)
+    fn delayed(&self, by: &Expr) -> Result<F, Trouble> {
+        Ok(delay_factor(self.draw, self.constant(by)?))
+    }
+
+    fn signal_law(&mut self, id: SignalId, law: &Expr) -> Result<Form<F>, Trouble> {
+        match self.form(law, None) {
+            Err(Trouble::Nonlinear) => {}
+            found => return found,
+        }
+        let offset: F = self.draw.of(Of::Signal(id.index()));
+        let value = Form::number(offset);
+        let cut = Cut {
+            offset,
+            slope: F::ZERO,
+            follows: Follows::Nothing,
+            value: value.clone(),
+            law: law.clone(),
+            own: None,
+        };
+        self.cuts.insert(Place::Signal(id), cut);
+        Ok(value)
+    }
+
+    /// The values of an expression at a solution.
+    ///
+    /// # Errors
+    /// Why it has none.
+    pub fn value(
+        &self,
+        expr: &Expr,
+        own: Option<VertexId>,
+        solution: &[F],
+        cut: Option<&HashMap<u64, F>>,
+    ) -> Result<F, Trouble> {
+        Reading { draw: self.draw, cut }
+            .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(leaf, own)?.at(solution))))
+    }
+
+    /// Of every law that is cut the value of its text, and what it was cut to.
+    ///
+    /// # Errors
+    /// What has no value in this draw.
+    pub fn cut_values(&self, solution: &[F]) -> Result<HashMap<u64, F>, Trouble> {
+        let mut table = HashMap::new();
+        for (modulus, own, number) in &self.moduli {
+            let value = self.value(modulus, Some(*own), solution, None)?;
+            table.insert(value.value(), *number);
+        }
+        for cut in self.cuts.values() {
+            let value = self.value(&cut.law, cut.own, solution, None)?;
+            table.insert(value.value(), cut.value.at(solution));
+        }
+        Ok(table)
+    }
+
+    /// The names of what is not determined, and of the laws that depend on each other.
+    pub fn explain(&self, found: &Undetermined) -> (Vec<String>, Vec<String>) {
+        let unknowns = found.unknowns.iter().map(|column| self.name(*column)).collect();
+        let mut origins: Vec<String> = vec![];
+        for row in &found.rows {
+            let name = match self.origins.get(*row as usize) {
+                Some(Place::Port(end)) => self.graph.vertex(end.vertex).name.clone(),
+                Some(Place::Signal(id)) => self.graph.signals[id.index()].name.clone(),
+                None => continue,
+            };
+            if !origins.contains(&name) {
+                origins.push(name);
+            }
+        }
+        (unknowns, origins)
+    }
+
+    fn name(&self, column: u32) -> String {
+        let bond = BondId(column / 2);
+        if bond.index() < self.graph.bonds.len() {
+            let letter = if column.is_multiple_of(2) { 'e' } else { 'f' };
+            return format!("{letter}({})", self.graph.bond_name(bond));
+        }
+        if let Some(k) = self.signals.iter().position(|signal| *signal == column) {
+            return self.graph.signals[k].name.clone();
+        }
+        let stored = self.stored.iter().find(|(_, own)| **own == column);
+        stored.map_or_else(String::new, |(end, _)| {
+            let inertia = self.graph.storage(*end) == Some(Storage::Inertia);
+            format!("{}({})", if inertia { 'p' } else { 'q' }, self.graph.port_name(*end))
+        })
+    }
+}
+
+/// What stands for exp(−s·T) of a delay.
+pub fn delay_factor<F: Modular>(draw: Draw, by: F) -> F {
+    draw.opaque(0x6465_6c61, &[by])
+}
