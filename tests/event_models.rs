@@ -309,3 +309,24 @@ fn the_mass_on_the_belt_sticks_and_slips() {
     assert_eq!(statistics.warnings.len(), 1, "{statistics}");
     assert!(statistics.slides >= 4, "{statistics}");
 }
+
+#[test]
+fn on_a_fast_belt_both_routes_stick_and_slip_alike() {
+    for speed in ["0.3", "0.5", "1"] {
+        let text = file("models/stick_slip.bg");
+        let overrides =
+            Overrides { set: vec![("v_belt".into(), speed.into())], ..Overrides::default() };
+        let (trace, statistics) = run_text("stick_slip.bg", &text, &overrides).unwrap();
+        let mut map = SourceMap::default();
+        let (id, mut d) = (map.add("stick_slip.bg", text), vec![]);
+        let graph = pipeline::graph(&mut map, id, &overrides, &mut d).unwrap();
+        let causality = causality::assign(&graph, &mut d).unwrap();
+        let settings = second::Settings::default();
+        let own = second::integrate(&graph, &causality, trace.time(), &settings, &mut d);
+        let own = own.unwrap_or_else(|| panic!("{speed}: {d:#?}"));
+        assert!(own.energy.residual.abs() < 1e-6 * own.energy.turnover, "{speed}");
+        for (name, exact) in own.names.iter().zip(&own.columns).skip(1) {
+            assert!(worst(&trace, name, exact) <= 1e-5, "{speed}, {name}: {statistics}");
+        }
+    }
+}

@@ -260,6 +260,25 @@ impl Conditions {
         any
     }
 
+    /// Whether a condition that is held stands on its threshold, and makes it the one to change.
+    pub fn stands_on_threshold(
+        &mut self,
+        compiled: &mut Compiled,
+        [t, inside]: [f64; 2],
+        y: &[f64],
+    ) -> bool {
+        if self.loose {
+            return false;
+        }
+        compiled.guards(t, inside, y, &mut self.values);
+        self.target = self.states.iter().enumerate().position(|(k, state)| {
+            let excess = state.excess(self.values[2 * k], self.values[2 * k + 1]);
+            state.slope == 0.0 && excess.abs() <= 16.0 * state.room()
+        });
+        self.tries = 0;
+        self.target.is_some()
+    }
+
     /// Lets all go.
     pub fn let_go(&mut self, compiled: &mut Compiled) {
         self.loose = true;

@@ -227,7 +227,7 @@ fn march(
             settled.map_err(|trouble| Failure::Restart { t: from, trouble })?;
             sizes.see(&y);
         }
-        let mut t = from;
+        let (mut t, mut turns) = (from, 0);
         while t < to {
             let weights = sizes.weights(settings.tolerance, pilot);
             conditions.see_noise(compiled, [t, inside], &y, &weights, settings.tolerance);
@@ -260,6 +260,18 @@ fn march(
                     t = reached;
                     continue;
                 }
+                // A condition that has just changed and at once contradicts itself changes back, and slides at last.
+                Err(Stop::StepTooSmall { .. })
+                    if turns < MOST_TURNS
+                        && conditions.stands_on_threshold(compiled, [reached, inside], &y) =>
+                {
+                    turns += 1;
+                    t = reached;
+                    conditions
+                        .pass(compiled, structure, t, [from, to], &mut y)
+                        .map_err(|trouble| Failure::Restart { t, trouble })?;
+                    continue;
+                }
                 // A branch may have no values past its threshold, where the other one has.
                 Err(Stop::StepTooSmall { .. }) if !was_loose && !conditions.is_empty() => {
                     conditions.let_go(compiled);
@@ -268,7 +280,7 @@ fn march(
                 }
                 Err(stop) => return Err(Failure::Stop(stop)),
             };
-            (t, h) = (ended.t, Some(ended.h));
+            (t, h, turns) = (ended.t, Some(ended.h), 0);
             if t < to {
                 conditions
                     .pass(compiled, structure, t, [from, to], &mut y)
@@ -298,6 +310,9 @@ fn march(
     report(&Event::End(&y));
     Ok((statistics, conditions))
 }
+
+/// How often conditions turn at one place before that is said to lead nowhere.
+const MOST_TURNS: u32 = 16;
 
 /// A first step within which no state moves by more than a small part of what is allowed times a hundred.
 fn first_step(radau: &mut Radau, [start, from, to]: [f64; 3], y: &[f64], last: Option<f64>) -> f64 {
