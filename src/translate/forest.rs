@@ -21,6 +21,18 @@ impl Forest {
         self.above.len() - 1
     }
 
+    /// How many numbers there are.
+    pub fn len(&self) -> usize {
+        self.above.len()
+    }
+
+    /// Takes the last numbers out again, from `first` on, which must not be above any that stay: the lower head stays
+    /// head, so that is so where those that go were joined among themselves and to ones that stay.
+    pub fn truncate(&mut self, first: usize) {
+        self.above.truncate(first);
+        self.flipped.truncate(first);
+    }
+
     /// The head of a number's set.
     pub fn root(&self, number: usize) -> usize {
         self.signed(number).0

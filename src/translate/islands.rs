@@ -87,6 +87,14 @@ pub fn find(graph: &BondGraph) -> Vec<Island> {
 
 /// The bonds outside a breadth-first spanning tree from the first junction.
 fn closing_bonds(graph: &BondGraph, island: &Island) -> Vec<BondId> {
+    let inner = |id: &&BondId| {
+        let bond = graph.bond(**id);
+        is_junction(graph, bond.from.vertex) && is_junction(graph, bond.to.vertex)
+    };
+    if island.bonds.iter().filter(inner).count() < island.junctions.len().max(1) {
+        // A tree.
+        return vec![];
+    }
     let mut reached = vec![false; graph.vertices.len()];
     let mut in_tree = vec![false; graph.bonds.len()];
     let mut queue = std::collections::VecDeque::new();

@@ -6,7 +6,9 @@
 //! 1. `forms`: which devices stand for each element;
 //! 2. `islands`: what hangs together when only TF and GY separate;
 //! 3. `flows`: where each flow can be read, and 0 V sources where one is needed and nothing carries it;
-//! 4. `series_parallel`, `couplers`: the nodes between which everything stands;
+//! 4. the nodes between which everything stands: `series_parallel` draws trees of junctions, `couplers` closes loops,
+//!    by wires, by the graph that [`graphic`] finds for the flows of an island (`space`, drawn by `realise`), or by
+//!    1:1 couplers where there is none;
 //! 5. `elements`, `signals`, `experiment`: the cards;
 //! 6. [`map`]: every effort, flow, state and signal in terms of the circuit.
 
@@ -17,7 +19,9 @@ mod forms;
 mod islands;
 mod flows;
 mod series_parallel;
+mod space;
 mod couplers;
+mod realise;
 mod values;
 mod elements;
 mod signals;
@@ -25,6 +29,8 @@ mod experiment;
 pub mod map;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod loop_tests;
 
 pub use map::{Figures, Map};
 

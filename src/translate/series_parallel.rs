@@ -5,10 +5,12 @@
 //! the common flow runs round a loop through each bond's pair in turn: from plus to minus where the half arrow points
 //! out of the junction (a drop), from minus to plus where it points in (a rise).
 
+use super::couplers::fewest;
 use super::flows::Sense;
 use super::forest::Forest;
 use super::islands::{Island, is_junction, junction_end, other_end};
 use crate::bond::graph::{BondGraph, BondId, End, Law, Power, VertexId};
+use std::collections::{HashMap, HashSet};
 
 /// A node while circuits are drawn; nodes may be joined later. 0 is ground.
 pub type Point = usize;
@@ -50,6 +52,8 @@ pub struct Drawing {
     pub wishes: Vec<Option<(Fit, VertexId)>>,
     /// By bond: the pairs at its tail and at its head; the two differ by a 0 V source or a coupler at most.
     pub ends: Vec<[Option<Pair>; 2]>,
+    /// Efforts of bonds inside an island that stand between no two nodes: a sum of node voltages.
+    pub sums: HashMap<BondId, Vec<(Point, f64)>>,
     /// By island: what stands in it.
     pub items: Vec<Vec<Item>>,
 }
@@ -67,15 +71,37 @@ impl Drawing {
             points: Forest::new(1),
             wishes: vec![None],
             ends: vec![[None; 2]; graph.bonds.len()],
+            sums: HashMap::new(),
             items: vec![Vec::new(); islands.len()],
         };
         let mut sensed = vec![false; graph.bonds.len()];
         senses.iter().for_each(|sense| sensed[sense.bond.index()] = true);
         for (index, island) in islands.iter().enumerate() {
+            let before = drawing.points.len();
             drawing.draw_tree(graph, index, island, &sensed);
-            drawing.close_loops(graph, index, island, &sensed);
+            let open = drawing.close_by_wires(graph, index, island, &sensed);
+            if open.is_empty() {
+                continue;
+            }
+            match fewest(graph, island, &sensed, &open) {
+                Some(plan) => {
+                    drawing.erase(index, island, before);
+                    drawing.realise(graph, index, island, &sensed, &plan);
+                }
+                None => drawing.couple(index, &open, &sensed),
+            }
         }
         drawing
+    }
+
+    /// Takes an island, drawn last, out again, with all points from `first` on.
+    fn erase(&mut self, index: usize, island: &Island, first: Point) {
+        self.points.truncate(first);
+        self.wishes.truncate(first);
+        self.items[index].clear();
+        for bond in &island.bonds {
+            self.ends[bond.index()] = [None; 2];
+        }
     }
 
     /// The pair at one end of a bond.
@@ -88,7 +114,7 @@ impl Drawing {
         Pair { plus: self.points.root(pair.plus), minus: self.points.root(pair.minus) }
     }
 
-    fn point(&mut self, wish: Option<(Fit, VertexId)>) -> Point {
+    pub(super) fn point(&mut self, wish: Option<(Fit, VertexId)>) -> Point {
         self.wishes.push(wish);
         self.points.add()
     }
@@ -100,8 +126,7 @@ impl Drawing {
             }
             return;
         };
-        let mut closing = vec![false; graph.bonds.len()];
-        island.closing.iter().for_each(|bond| closing[bond.index()] = true);
+        let closing: HashSet<BondId> = island.closing.iter().copied().collect();
         let first = match graph.vertex(root).law {
             Law::Zero => Pair { plus: self.point(Some((Fit::Exact, root))), minus: 0 },
             _ => Pair { plus: 0, minus: 0 },
@@ -125,10 +150,12 @@ impl Drawing {
                 let near_end = junction_end(junction);
                 let far_end = other_end(graph, bond, near_end);
                 self.set(graph, bond, near_end, near);
-                if closing[bond.index()] {
+                if closing.contains(&bond) {
                     continue;
                 }
-                let far = self.cross(graph, index, bond, near_end, near, junction, sensed);
+                let mut items = Vec::new();
+                let far = self.cross(graph, &mut items, bond, near_end, near, junction, sensed);
+                self.items[index].extend(items);
                 self.set(graph, bond, far_end, far);
                 if is_junction(graph, far_end.vertex) {
                     children.push((far_end.vertex, Some(bond), far));
@@ -148,7 +175,9 @@ impl Drawing {
         let pair = Pair { plus: self.point(Some((Fit::Exact, named))), minus: 0 };
         self.set(graph, id, bond.from, pair);
         self.items[index].push(Item::Port(bond.from));
-        let far = self.cross(graph, index, id, bond.from, pair, named, sensed);
+        let mut items = Vec::new();
+        let far = self.cross(graph, &mut items, id, bond.from, pair, named, sensed);
+        self.items[index].extend(items);
         self.set(graph, id, bond.to, far);
         self.items[index].push(Item::Port(bond.to));
     }
@@ -167,10 +196,10 @@ impl Drawing {
 
     /// The pair at the far end of a bond: the near one, or behind a 0 V source in the + wire.
     #[allow(clippy::too_many_arguments)]
-    fn cross(
+    pub(super) fn cross(
         &mut self,
         graph: &BondGraph,
-        index: usize,
+        items: &mut Vec<Item>,
         bond: BondId,
         near_end: End,
         near: Pair,
@@ -186,7 +215,7 @@ impl Drawing {
         } else {
             (far.plus, near.plus)
         };
-        self.items[index].push(Item::Sense { bond, plus, minus });
+        items.push(Item::Sense { bond, plus, minus });
         far
     }
 
@@ -225,7 +254,7 @@ impl Drawing {
 
     /// The place of a bond among its junction's: sources first, loads last, and 0-junctions at the ends of a loop,
     /// where their return meets ground.
-    fn place(&self, graph: &BondGraph, bond: BondId, junction: VertexId) -> u32 {
+    pub(super) fn place(&self, graph: &BondGraph, bond: BondId, junction: VertexId) -> u32 {
         let far = other_end(graph, bond, junction_end(junction));
         let vertex = graph.vertex(far.vertex);
         let inward = graph.bond(bond).to.vertex == junction;

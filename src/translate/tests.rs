@@ -11,11 +11,11 @@ use std::collections::HashMap;
 /// The value of s at which storages are compared: impedances s·L and 1/(s·C), nothing stored at the start.
 const S: f64 = 0.7;
 
-fn text(translation: &Translation) -> String {
+pub fn text(translation: &Translation) -> String {
     crate::netlist::write::write(&translation.netlist)
 }
 
-fn translated(graph: &BondGraph) -> Translation {
+pub fn translated(graph: &BondGraph) -> Translation {
     let mut diagnostics = Vec::new();
     let translation = translate(
         graph,
@@ -232,7 +232,7 @@ impl Solved {
 }
 
 /// Compares every effort and flow; says how many were compared, `None` when the graph is singular.
-fn compare(graph: &BondGraph) -> Option<usize> {
+pub fn compare(graph: &BondGraph) -> Option<usize> {
     let expected = bond_solution(graph)?;
     let translation = translated(graph);
     let solved = Solved::of(&translation, HashMap::new())

@@ -3,6 +3,7 @@
 use super::Builder;
 use super::flows::{Carrier, Origin};
 use super::forms::{Form, SourceValue, form_at};
+use super::series_parallel::Point;
 use super::signals::Place;
 use crate::bond::graph::{self, BondId, End, Law, Leaf, Power, StoreLaw, Variable, VertexId};
 use crate::diagnostic::Diagnostic;
@@ -131,7 +132,19 @@ impl Builder<'_> {
         // The node that bears the junction's name, where a 0 V source makes two of it.
         let zero = |vertex| matches!(self.graph.vertex(vertex).law, graph::Law::Zero);
         let pair = if zero(self.graph.bond(bond).to.vertex) { to } else { from };
-        Some(self.voltage(self.nodes(pair?)))
+        match pair.or(from).or(to) {
+            Some(pair) => Some(self.voltage(self.nodes(pair))),
+            None => Some(self.voltage_sum(self.drawing.sums.get(&bond)?)),
+        }
+    }
+
+    /// A sum of node voltages.
+    fn voltage_sum(&self, terms: &[(Point, f64)]) -> Expr {
+        let terms = terms.iter().filter(|(point, _)| self.node(*point) != self.ground());
+        sum(terms.map(|(point, by)| {
+            let voltage = self.voltage([self.node(*point), self.ground()]);
+            signed(product(Expr::number(by.abs()), voltage), *by < 0.0)
+        }))
     }
 
     /// An expression in terms of the circuit; `own` is the element whose law it is.

@@ -143,7 +143,7 @@ pub fn check(matrix: &Matrix, graph: &Graph) {
 }
 
 /// A random 2-connected graph: a cycle, then ears; many in series or parallel.
-fn two_connected(edges: usize, dice: &mut Dice) -> (usize, Vec<[usize; 2]>) {
+pub fn two_connected(edges: usize, dice: &mut Dice) -> (usize, Vec<[usize; 2]>) {
     let first = 2 + dice.below(5);
     let mut nodes = first;
     let mut list: Vec<[usize; 2]> = (0..first).map(|node| [node, (node + 1) % first]).collect();
@@ -165,7 +165,7 @@ fn two_connected(edges: usize, dice: &mut Dice) -> (usize, Vec<[usize; 2]>) {
 }
 
 /// A random 3-connected graph: from a wheel by new edges and by splitting nodes (W. T. Tutte, 1961).
-fn three_connected(edges: usize, dice: &mut Dice) -> (usize, Vec<[usize; 2]>) {
+pub fn three_connected(edges: usize, dice: &mut Dice) -> (usize, Vec<[usize; 2]>) {
     let rim = 4 + dice.below(3);
     let mut nodes = rim + 1;
     let wheel = (1..=rim).flat_map(|node| [[0, node], [node, node % rim + 1]]);
