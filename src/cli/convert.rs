@@ -75,6 +75,9 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
     let Some(model) = model else { return Err(session.exit()) };
+    if session.global.verbose {
+        session.remark(&format!("{}: {}", model.graph.name, model.translation.figures));
+    }
     let text = write::write(&model.translation.netlist);
     write_text(arguments.output.as_deref(), &text, session)?;
     if let Some(name) = &arguments.map {

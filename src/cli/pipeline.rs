@@ -116,6 +116,9 @@ fn check_options(syntax: &syntax::File, overrides: &Overrides, d: &mut Vec<Diagn
 pub fn causality(graph: &BondGraph, d: &mut Vec<Diagnostic>) -> Option<Causality> {
     let before = d.len();
     let causality = causality::assign(graph, d);
+    if causality.is_some() {
+        translate::forced::check(graph, d);
+    }
     merge_repeats(d, before);
     causality
 }

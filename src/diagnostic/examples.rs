@@ -117,6 +117,8 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "W0510" "undetermined_flow.bg"
     "E0601" "flow_of_a_ring.bg"
     "E0603" "noise_too_long.bg"
+    "E0604" "source_short_circuited.bg"
+    "W0601" "element_short_circuited.bg"
     "E0701" "unknown_card.cir"
     "E0702" "transistor.cir"
     "E0703" "value_missing.cir"

@@ -12,11 +12,13 @@ use super::islands::{Island, is_junction};
 use super::realise::Plan;
 use super::series_parallel::{Drawing, Item, Pair};
 use super::space::Space;
-use crate::bond::graph::{BondGraph, BondId, Law};
-use std::collections::HashSet;
+use crate::bond::graph::{BondGraph, BondId, Law, VertexId};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Graphs are sought for this many sets of cut bonds, times 100 ports and bonds.
-const MOST_TRIALS: usize = 4000;
+/// Graphs are sought for this many sets of cut bonds in a part of a hundred bonds.
+const MOST_TRIALS: usize = 3000;
+/// And for this many in any.
+const LEAST_TRIALS: usize = 30;
 
 impl Drawing {
     /// Joins the two ends of closing bonds by wires. Returns the bonds for which none will do.
@@ -121,7 +123,7 @@ fn equal_junctions(graph: &BondGraph, island: &Island) -> Forest {
 /// Whether a bond closes a ring of junctions of one kind: what runs round it is left undetermined.
 fn closes_ring(graph: &BondGraph, equal: &mut Forest, bond: BondId) -> bool {
     let bond = graph.bond(bond);
-    let kind = |vertex: crate::bond::graph::VertexId| matches!(graph.vertex(vertex).law, Law::Zero);
+    let kind = |vertex: VertexId| matches!(graph.vertex(vertex).law, Law::Zero);
     kind(bond.from.vertex) == kind(bond.to.vertex)
         && equal.root(bond.from.vertex.index()) == equal.root(bond.to.vertex.index())
 }
@@ -133,18 +135,69 @@ pub fn fewest(
     sensed: &[bool],
     open: &[BondId],
 ) -> Option<Plan> {
-    let mut search = Search::new(graph, island, sensed);
-    for size in 0..open.len() {
-        // All sets of few bonds, as long as they can be counted.
-        if choose(search.candidates.len(), size) > search.trials {
-            let found = search.exchange(open.to_vec(), size);
-            return found.filter(|plan| plan.cut.len() < open.len());
-        }
-        if let Some(plan) = search.all(size) {
-            return Some(plan);
+    let mut cut = Vec::new();
+    for (part, candidates) in parts(graph, island) {
+        let known = open.iter().copied().filter(|bond| part.closing.contains(bond)).collect();
+        cut.extend(Search::new(graph, &part, sensed, candidates).fewest(known));
+    }
+    if cut.len() >= open.len() {
+        return None;
+    }
+    plan(graph, island, sensed, &cut)
+}
+
+/// The graph of an island's ports with some bonds cut.
+fn plan(graph: &BondGraph, island: &Island, sensed: &[bool], cut: &[BondId]) -> Option<Plan> {
+    let space = Space::new(graph, island, cut, &|bond| sensed[bond.index()]);
+    let realised = space.realise()?;
+    Some(Plan { space, graph: realised, cut: cut.to_vec() })
+}
+
+/// The parts of an island that hang together without any one bond, with the bonds between their junctions. A bond between two parts joins them as one port of
+/// either: there is a graph of the whole when there is one of each.
+fn parts(graph: &BondGraph, island: &Island) -> Vec<(Island, Vec<BondId>)> {
+    let looping = in_loops(graph, island);
+    let mut groups: HashMap<VertexId, usize> = HashMap::new();
+    let mut sets = Forest::new(island.junctions.len());
+    groups.extend(island.junctions.iter().enumerate().map(|(at, junction)| (*junction, at)));
+    let place = |vertex: VertexId| groups.get(&vertex).copied();
+    for bond in &looping {
+        let bond = graph.bond(*bond);
+        if let (Some(a), Some(b)) = (place(bond.from.vertex), place(bond.to.vertex)) {
+            sets.join(a, b);
         }
     }
-    None
+    let mut parts: BTreeMap<usize, (Island, Vec<BondId>)> = BTreeMap::new();
+    let set_of = |bond: BondId| Some(sets.root(place(graph.bond(bond).from.vertex)?));
+    for bond in &looping {
+        let fresh =
+            || Island { junctions: vec![], bonds: vec![], closing: vec![], domain: island.domain };
+        if let Some(set) = set_of(*bond) {
+            parts.entry(set).or_insert_with(|| (fresh(), vec![])).1.push(*bond);
+        }
+    }
+    for (at, junction) in island.junctions.iter().enumerate() {
+        if let Some((part, _)) = parts.get_mut(&sets.root(at)) {
+            part.junctions.push(*junction);
+        }
+    }
+    for bond in &island.bonds {
+        let ends = [graph.bond(*bond).from.vertex, graph.bond(*bond).to.vertex];
+        let mut sets: Vec<usize> =
+            ends.into_iter().filter_map(place).map(|at| sets.root(at)).collect();
+        sets.dedup();
+        for set in sets {
+            if let Some((part, _)) = parts.get_mut(&set) {
+                part.bonds.push(*bond);
+            }
+        }
+    }
+    for bond in &island.closing {
+        if let Some((part, _)) = set_of(*bond).and_then(|set| parts.get_mut(&set)) {
+            part.closing.push(*bond);
+        }
+    }
+    parts.into_values().collect()
 }
 
 /// The number of sets of `size` out of `count`.
@@ -163,28 +216,45 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn new<'a>(graph: &'a BondGraph, island: &'a Island, sensed: &'a [bool]) -> Search<'a> {
-        let size = island.bonds.len().max(1);
-        let trials = (MOST_TRIALS * 100 / size).clamp(50, MOST_TRIALS);
-        Search { graph, island, sensed, candidates: in_loops(graph, island), trials }
+    fn new<'a>(
+        graph: &'a BondGraph,
+        island: &'a Island,
+        sensed: &'a [bool],
+        candidates: Vec<BondId>,
+    ) -> Search<'a> {
+        // Seeking a graph of a hundred bonds takes about half a millisecond, of ten times as many a hundred times that.
+        let size = island.bonds.len().max(100) as f64 / 100.0;
+        let trials = ((MOST_TRIALS as f64 / (size * size)) as usize).max(LEAST_TRIALS);
+        Search { graph, island, sensed, candidates, trials }
     }
 
-    fn plan(&mut self, cut: &[BondId]) -> Option<Plan> {
+    /// As few bonds to be cut as are found: all sets of few bonds, as long as they can be counted; then fewer than those
+    /// that are known.
+    fn fewest(&mut self, known: Vec<BondId>) -> Vec<BondId> {
+        for size in 0..known.len() {
+            if choose(self.candidates.len(), size) > self.trials {
+                return self.exchange(known, size);
+            }
+            if let Some(cut) = self.all(size) {
+                return cut;
+            }
+        }
+        known
+    }
+
+    fn leaves_graph(&mut self, cut: &[BondId]) -> bool {
         self.trials = self.trials.saturating_sub(1);
-        let sensed = |bond: BondId| self.sensed[bond.index()];
-        let space = Space::new(self.graph, self.island, cut, &sensed);
-        let graph = space.realise()?;
-        Some(Plan { space, graph, cut: cut.to_vec() })
+        plan(self.graph, self.island, self.sensed, cut).is_some()
     }
 
     /// The first set of this size that leaves a graph.
-    fn all(&mut self, size: usize) -> Option<Plan> {
+    fn all(&mut self, size: usize) -> Option<Vec<BondId>> {
         let count = self.candidates.len();
         let mut places: Vec<usize> = (0..size).collect();
         loop {
             let cut: Vec<BondId> = places.iter().map(|place| self.candidates[*place]).collect();
-            if let Some(plan) = self.plan(&cut) {
-                return Some(plan);
+            if self.leaves_graph(&cut) {
+                return Some(cut);
             }
             // The next set in order.
             let at = (0..size).rev().find(|at| places[*at] < count + *at - size)?;
@@ -197,49 +267,54 @@ impl Search<'_> {
 
     /// Fewer and fewer cuts: one is left out, or two are exchanged for another one, as long as a graph remains and trials
     /// are left. Sets smaller than `least` are known to leave none.
-    fn exchange(&mut self, start: Vec<BondId>, least: usize) -> Option<Plan> {
-        let mut best = self.plan(&start)?;
-        'smaller: while best.cut.len() > least && self.trials > 0 {
-            let cut = best.cut.clone();
-            for out in 0..cut.len() {
-                let mut fewer = cut.clone();
+    fn exchange(&mut self, known: Vec<BondId>, least: usize) -> Vec<BondId> {
+        let mut best = known;
+        'smaller: while best.len() > least {
+            for out in 0..best.len() {
+                let mut fewer = best.clone();
                 fewer.remove(out);
-                if let Some(plan) = self.plan(&fewer) {
-                    best = plan;
+                if self.trials == 0 {
+                    return best;
+                }
+                if self.leaves_graph(&fewer) {
+                    best = fewer;
                     continue 'smaller;
                 }
             }
             for candidate in self.candidates.clone() {
-                for (second, first) in (1..cut.len()).flat_map(|b| (0..b).map(move |a| (b, a))) {
-                    if self.trials == 0 || cut.contains(&candidate) {
+                for (second, first) in (1..best.len()).flat_map(|b| (0..b).map(move |a| (b, a))) {
+                    if best.contains(&candidate) {
                         break;
                     }
-                    let mut fewer = cut.clone();
+                    let mut fewer = best.clone();
                     fewer.remove(second);
                     fewer[first] = candidate;
-                    if let Some(plan) = self.plan(&fewer) {
-                        best = plan;
+                    if self.trials == 0 {
+                        return best;
+                    }
+                    if self.leaves_graph(&fewer) {
+                        best = fewer;
                         continue 'smaller;
                     }
                 }
             }
             break;
         }
-        Some(best)
+        best
     }
 }
 
 /// Bonds between junctions without which the junctions still hang together: what the leaves of the graph of junctions
 /// and of its bridges leave over.
-fn in_loops(graph: &BondGraph, island: &Island) -> Vec<BondId> {
+pub fn in_loops(graph: &BondGraph, island: &Island) -> Vec<BondId> {
     let inner = |bond: &BondId| {
         let bond = graph.bond(*bond);
         is_junction(graph, bond.from.vertex) && is_junction(graph, bond.to.vertex)
     };
     let closing: HashSet<BondId> = island.closing.iter().copied().collect();
     // Each closing bond marks the way through the tree between its ends.
-    let mut above = std::collections::HashMap::new();
-    let mut depth = std::collections::HashMap::new();
+    let mut above = HashMap::new();
+    let mut depth = HashMap::new();
     let mut waiting = Vec::new();
     if let Some(root) = island.junctions.first() {
         depth.insert(*root, 0usize);

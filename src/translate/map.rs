@@ -70,6 +70,17 @@ pub struct Figures {
     pub helpers: usize,
 }
 
+impl std::fmt::Display for Figures {
+    /// `4 nodes, 7 devices, 0 helpers`.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Figures { nodes, devices, helpers } = self;
+        let many = |count: &usize| if *count == 1 { "" } else { "s" };
+        write!(f, "{nodes} node{}, ", many(nodes))?;
+        write!(f, "{devices} device{}, ", many(devices))?;
+        write!(f, "{helpers} helper{}", many(helpers))
+    }
+}
+
 /// Which bond a card belongs to.
 #[derive(Clone, Debug)]
 pub struct Link {

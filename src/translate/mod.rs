@@ -22,6 +22,7 @@ mod series_parallel;
 mod space;
 mod couplers;
 mod realise;
+pub mod forced;
 mod values;
 mod elements;
 mod signals;

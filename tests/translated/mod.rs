@@ -17,6 +17,7 @@ pub struct Translated {
     pub translation: Translation,
 }
 
+#[allow(dead_code)]
 impl Translated {
     /// The netlist's text.
     pub fn text(&self) -> String {
