@@ -214,7 +214,7 @@ impl<L> Stack<'_, L> {
     fn operation(&mut self, op: Binary, left: Part<L>, right: Part<L>) -> Option<Part<L>> {
         let span = left.place.join(right.place);
         let depth = left.depth.max(right.depth);
-        let node = if op == Binary::Power && self.dialect == Dialect::Ngspice {
+        let node = if op == Binary::Power && self.dialect != Dialect::Bond {
             Node::Call(Function::PowerOfAbs, vec![left.expr, right.expr])
         } else {
             Node::Binary(op, left.expr, right.expr)

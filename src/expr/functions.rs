@@ -50,8 +50,12 @@ pub enum Function {
 pub enum Dialect {
     /// Bond-graph files.
     Bond,
-    /// Netlists as ngspice 39 reads them by default; what we write is read alike by newer ones and by Xyce, LTspice.
+    /// Netlists as ngspice 39 reads them by default, and newer ones.
     Ngspice,
+    /// Netlists for Xyce: comparisons stand within conditions only.
+    Xyce,
+    /// Netlists for LTspice: a condition holds above ½, the signs of logic are single.
+    Ltspice,
 }
 
 /// A leaf of a derivative or an expansion.
@@ -115,8 +119,8 @@ pub struct Row {
     pub value: Value,
     /// Its partial derivative by argument k. Where a function has a corner, the derivative of one side.
     pub derivative: fn(usize) -> Template,
-    /// How a netlist for ngspice writes it.
-    pub ngspice: Spelling,
+    /// How a netlist writes it: what every simulator of SPICE's family reads alike.
+    pub netlist: Spelling,
 }
 
 fn a() -> Template {
@@ -171,7 +175,7 @@ macro_rules! row {
             name: $name,
             value: $value,
             derivative: $derivative,
-            ngspice: $spelling,
+            netlist: $spelling,
         }
     };
 }
@@ -366,7 +370,7 @@ pub fn find(dialect: Dialect, name: &str) -> Option<Meaning> {
     };
     match dialect {
         Dialect::Bond => in_table(name),
-        Dialect::Ngspice => {
+        _ => {
             let folded = name.to_lowercase();
             let own = NGSPICE_NAMES.iter().find(|(own, _)| *own == folded);
             match own {
@@ -497,7 +501,7 @@ mod tests {
         #[test]
         fn expansions_agree_with_values(u in -1.0..1.0f64, v in -1.0..1.0f64, w in -1.0..1.0f64) {
             for row in FUNCTIONS {
-                if let Spelling::Expansion(template) = row.ngspice {
+                if let Spelling::Expansion(template) = row.netlist {
                     let point = point(row.function, u, v, w);
                     let value = row.value.at(&point);
                     let spelled = at(&template(), &point, f64::NAN);

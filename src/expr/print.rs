@@ -1,9 +1,9 @@
-//! Expressions as text: as `.bg` files write them, and as netlists for ngspice do.
+//! Expressions as text: as `.bg` files write them, and as netlists do.
 //!
 //! Text for netlists must mean the same in every reader and never rest on a sign convention: `^`, `pow` and `pwr`
 //! differ between simulators (and between versions of one), so whole powers become products and other powers go
 //! through `exp` and `ln`; limits are `min(max())`; tables hold their ends by clamping the argument of `pwl`, which
-//! would extrapolate; numbers carry no suffix.
+//! would extrapolate; numbers carry no suffix. Where spellings of one meaning differ, [`Dialect`] decides.
 
 use super::functions::{Dialect, Function, Slot, Spelling, Template};
 use super::tree::{Binary, Expr, Node, Table, Unary};
@@ -86,51 +86,118 @@ impl Piece {
 }
 
 fn piece<L>(expr: &Expr<L>, dialect: Dialect, leaf: &mut dyn FnMut(&L) -> Piece) -> Piece {
-    let spice = dialect == Dialect::Ngspice;
+    let spice = dialect != Dialect::Bond;
     match &*expr.node {
         Node::Number(value) => Piece::number(*value),
         Node::Leaf(name) => leaf(name),
         Node::Unary(Unary::Negate, a) => {
             Piece::new(format!("-{}", piece(a, dialect, leaf).at(PRODUCT + 1)), SUM)
         }
-        Node::Unary(Unary::Not, a) => {
-            let a = piece(a, dialect, leaf);
-            if spice {
-                Piece::atom(format!("(!{})", a.bracketed()))
-            } else {
-                Piece::new(format!("not {}", a.at(NOT)), NOT)
-            }
+        Node::Unary(Unary::Not, a) if !spice => {
+            Piece::new(format!("not {}", piece(a, dialect, leaf).at(NOT)), NOT)
         }
         Node::Binary(Binary::Power, a, b) if spice => {
             let (base, exponent) = (piece(a, dialect, leaf), piece(b, dialect, leaf));
-            real_power(&base, b.constant(), &exponent)
+            real_power(&base, b.constant(), &exponent, dialect)
         }
-        Node::Binary(op, a, b) => {
-            binary(*op, &piece(a, dialect, leaf), &piece(b, dialect, leaf), spice)
+        _ if is_condition(expr) && spice => {
+            let condition = condition(expr, dialect, leaf);
+            match dialect {
+                Dialect::Ngspice => condition,
+                _ => choice(&condition, &Piece::number(1.0), &Piece::number(0.0), dialect),
+            }
         }
+        Node::Unary(Unary::Not, a) => piece(a, dialect, leaf),
+        Node::Binary(op, a, b) => binary(*op, &piece(a, dialect, leaf), &piece(b, dialect, leaf)),
         Node::Call(function, arguments) => {
             let pieces: Vec<Piece> = arguments.iter().map(|a| piece(a, dialect, leaf)).collect();
             let exponent = arguments.get(1).and_then(Expr::constant);
             call(*function, &pieces, exponent, dialect)
         }
         Node::If(c, a, b) => {
-            let c = piece(c, dialect, leaf);
+            let c = condition(c, dialect, leaf);
             let a = piece(a, dialect, leaf);
             let b = piece(b, dialect, leaf);
-            if spice {
-                let (c, a, b) = (c.bracketed(), a.bracketed(), b.bracketed());
-                Piece::atom(format!("({c} ? {a} : {b})"))
-            } else {
-                let text = format!("if {} then {} else {}", c.at(OR), a.at(OR), b.text);
-                Piece::new(text, CONDITIONAL)
-            }
+            choice(&c, &a, &b, dialect)
         }
-        Node::Table(a, table) => interpolation(&piece(a, dialect, leaf), table, spice),
+        Node::Table(a, table) => interpolation(&piece(a, dialect, leaf), table, dialect),
     }
 }
 
-fn binary(op: Binary, a: &Piece, b: &Piece, spice: bool) -> Piece {
-    let (sign, level, left, right) = match op {
+/// Whether a value is the truth of something.
+fn is_condition<L>(expr: &Expr<L>) -> bool {
+    match &*expr.node {
+        Node::Unary(Unary::Not, _) => true,
+        Node::Binary(op, ..) => is_truth(*op),
+        _ => false,
+    }
+}
+
+fn is_truth(op: Binary) -> bool {
+    op.is_comparison() || matches!(op, Binary::And | Binary::Or)
+}
+
+/// What stands where a condition is asked for. Simulators differ in which numbers are true, so that other than with
+/// ngspice a number is compared with zero first.
+fn condition<L>(expr: &Expr<L>, dialect: Dialect, leaf: &mut dyn FnMut(&L) -> Piece) -> Piece {
+    match (&*expr.node, dialect) {
+        (_, Dialect::Bond) => piece(expr, dialect, leaf),
+        (Node::Unary(Unary::Not, a), _) => {
+            Piece::atom(format!("(!{})", condition(a, dialect, leaf).bracketed()))
+        }
+        (Node::Binary(op @ (Binary::And | Binary::Or), a, b), _) => {
+            let (a, b) = (condition(a, dialect, leaf), condition(b, dialect, leaf));
+            compared(*op, &a, &b, dialect)
+        }
+        (Node::Binary(op, a, b), _) if is_truth(*op) => {
+            let (a, b) = (piece(a, dialect, leaf), piece(b, dialect, leaf));
+            compared(*op, &a, &b, dialect)
+        }
+        (_, Dialect::Ngspice) => piece(expr, dialect, leaf),
+        _ => Piece::atom(format!("(abs({}) > 0)", piece(expr, dialect, leaf).text)),
+    }
+}
+
+/// A comparison, or two of them joined, in a netlist. Precedences differ between simulators: brackets everywhere.
+fn compared(op: Binary, a: &Piece, b: &Piece, dialect: Dialect) -> Piece {
+    let (a, b) = (a.at(PRODUCT), b.at(PRODUCT));
+    let sign = match (op, dialect) {
+        (Binary::Equal, Dialect::Ltspice) => {
+            return Piece::atom(format!("(abs({a}-({b})) <= 0)"));
+        }
+        (Binary::NotEqual, Dialect::Ltspice) => {
+            return Piece::atom(format!("(abs({a}-({b})) > 0)"));
+        }
+        (Binary::And, Dialect::Ltspice) => " & ",
+        (Binary::Or, Dialect::Ltspice) => " | ",
+        (Binary::And, _) => " && ",
+        (Binary::Or, _) => " || ",
+        (op, _) => signs(op).0,
+    };
+    Piece::atom(format!("({a}{sign}{b})"))
+}
+
+/// One of two values.
+fn choice(condition: &Piece, then: &Piece, otherwise: &Piece, dialect: Dialect) -> Piece {
+    match dialect {
+        Dialect::Bond => {
+            let (c, a, b) = (condition.at(OR), then.at(OR), &otherwise.text);
+            Piece::new(format!("if {c} then {a} else {b}"), CONDITIONAL)
+        }
+        Dialect::Ngspice => {
+            let [c, a, b] = [condition, then, otherwise].map(Piece::bracketed);
+            Piece::atom(format!("({c} ? {a} : {b})"))
+        }
+        Dialect::Xyce | Dialect::Ltspice => {
+            let [c, a, b] = [condition, then, otherwise].map(|piece| piece.text.as_str());
+            Piece::atom(format!("if({c},{a},{b})"))
+        }
+    }
+}
+
+/// The sign of an operator, its level, and the least levels of its operands.
+fn signs(op: Binary) -> (&'static str, u8, u8, u8) {
+    match op {
         Binary::Add => ("+", SUM, SUM, SUM + 1),
         Binary::Subtract => ("-", SUM, SUM, SUM + 1),
         Binary::Multiply => ("*", PRODUCT, PRODUCT, PRODUCT + 1),
@@ -142,23 +209,22 @@ fn binary(op: Binary, a: &Piece, b: &Piece, spice: bool) -> Piece {
         Binary::GreaterEqual => (" >= ", COMPARISON, SUM, SUM),
         Binary::Equal => (" == ", COMPARISON, SUM, SUM),
         Binary::NotEqual => (" != ", COMPARISON, SUM, SUM),
-        Binary::And => (if spice { " && " } else { " and " }, AND, AND, NOT),
-        Binary::Or => (if spice { " || " } else { " or " }, OR, OR, AND),
-    };
-    if spice && level <= COMPARISON {
-        // Precedences of comparisons and logic differ between simulators: brackets everywhere.
-        let text = format!("({}{sign}{})", a.at(PRODUCT), b.at(PRODUCT));
-        return Piece::atom(text);
+        Binary::And => (" and ", AND, AND, NOT),
+        Binary::Or => (" or ", OR, OR, AND),
     }
+}
+
+fn binary(op: Binary, a: &Piece, b: &Piece) -> Piece {
+    let (sign, level, left, right) = signs(op);
     Piece::new(format!("{}{sign}{}", a.at(left), b.at(right)), level)
 }
 
 fn call(function: Function, arguments: &[Piece], exponent: Option<f64>, dialect: Dialect) -> Piece {
     let row = function.row();
-    let name = match (dialect, row.ngspice) {
+    let name = match (dialect, row.netlist) {
         (Dialect::Bond, _) => row.name,
-        (Dialect::Ngspice, Spelling::Name(name)) => name,
-        (Dialect::Ngspice, Spelling::Expansion(template)) => {
+        (_, Spelling::Name(name)) => name,
+        (_, Spelling::Expansion(template)) => {
             return match (function, arguments) {
                 (Function::PowerOfAbs, [base, power]) => {
                     let even = exponent.is_some_and(|y| y % 2.0 == 0.0);
@@ -166,7 +232,7 @@ fn call(function: Function, arguments: &[Piece], exponent: Option<f64>, dialect:
                     magnitude_power(&base, exponent, power)
                 }
                 (Function::SignedPower, [base, power]) => signed_power(base, exponent, power),
-                _ => expansion(&template(), arguments),
+                _ => expansion(&template(), arguments, dialect),
             };
         }
     };
@@ -177,8 +243,8 @@ fn call(function: Function, arguments: &[Piece], exponent: Option<f64>, dialect:
     ))
 }
 
-fn expansion(template: &Template, arguments: &[Piece]) -> Piece {
-    piece(template, Dialect::Ngspice, &mut |slot| match slot {
+fn expansion(template: &Template, arguments: &[Piece], dialect: Dialect) -> Piece {
+    piece(template, dialect, &mut |slot| match slot {
         Slot::Argument(k) if *k < arguments.len() => arguments[*k].clone(),
         _ => Piece::number(f64::NAN),
     })
@@ -197,12 +263,17 @@ fn magnitude_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece 
 }
 
 /// The real power, for bases of either sign.
-fn real_power(base: &Piece, exponent: Option<f64>, power: &Piece) -> Piece {
+fn real_power(base: &Piece, exponent: Option<f64>, power: &Piece, dialect: Dialect) -> Piece {
     let Some(y) = exponent else {
         // Whole exponents have a sign for negative bases; for others the power is not real anyway.
         let (b, y) = (base.at(PRODUCT), power.at(ATOM));
-        let sign = format!("(({b} < 0) ? (1-2*({y}-2*floor({y}/2))) : (1))");
-        return Piece::new(format!("{sign}*{}", by_logarithm(&abs(base), power).text), PRODUCT);
+        let negative = Piece::atom(format!("({b} < 0)"));
+        let odd = Piece::new(format!("1-2*({y}-2*floor({y}/2))"), SUM);
+        let sign = choice(&negative, &odd, &Piece::number(1.0), dialect);
+        return Piece::new(
+            format!("{}*{}", sign.text, by_logarithm(&abs(base), power).text),
+            PRODUCT,
+        );
     };
     if let Some(product) = product_power(base, y) {
         return product;
@@ -279,20 +350,20 @@ fn by_logarithm(base: &Piece, power: &Piece) -> Piece {
     Piece::atom(format!("exp({}*ln({}))", power.at(PRODUCT + 1), base.text))
 }
 
-fn interpolation(argument: &Piece, table: &Table, spice: bool) -> Piece {
+fn interpolation(argument: &Piece, table: &Table, dialect: Dialect) -> Piece {
+    let (between, after) = if dialect == Dialect::Bond { (", ", "; ") } else { (",", ",") };
     let points = table.x.iter().zip(&table.y);
-    if !spice {
-        let rows: Vec<String> =
-            points.map(|(x, y)| format!("{}, {}", number(*x), number(*y))).collect();
-        return Piece::atom(format!("table({}, [{}])", argument.text, rows.join("; ")));
-    }
-    match (table.x.first(), table.x.last()) {
-        (Some(first), Some(last)) if first < last => {
-            let rows: Vec<String> =
-                points.map(|(x, y)| format!("{},{}", number(*x), number(*y))).collect();
-            let clamped =
-                format!("min(max({},{}),{})", argument.text, number(*first), number(*last));
-            Piece::atom(format!("pwl({clamped},{})", rows.join(",")))
+    let rows: Vec<String> =
+        points.map(|(x, y)| format!("{}{between}{}", number(*x), number(*y))).collect();
+    let rows = rows.join(after);
+    match (table.x.first(), table.x.last(), dialect) {
+        (_, _, Dialect::Bond) => Piece::atom(format!("table({}, [{rows}])", argument.text)),
+        (Some(first), Some(last), Dialect::Ngspice) if first < last => {
+            let (x, first, last) = (&argument.text, number(*first), number(*last));
+            Piece::atom(format!("pwl(min(max({x},{first}),{last}),{rows})"))
+        }
+        (Some(first), Some(last), _) if first < last => {
+            Piece::atom(format!("table({},{rows})", argument.text))
         }
         _ => Piece::number(table.y.first().copied().unwrap_or(f64::NAN)),
     }

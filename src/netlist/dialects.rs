@@ -1,29 +1,132 @@
 //! The dialects that netlists are written in and read from, one row each.
+//!
+//! All of them read the same cards but for what a row says. What a dialect has no word for is put in other words where
+//! there are any (`adapt`), else it is an error that names the element.
 
+use super::adapt::{self, Adapted};
 use super::{Netlist, read, write};
 use crate::diagnostic::Diagnostic;
+use crate::expr;
 use crate::source::{FileId, SourceMap};
 
 /// One row of the table.
-#[derive(Clone, Copy)]
 pub struct Dialect {
     /// What `--to` and `--dialect` call it.
     pub name: &'static str,
     /// The simulator, and how far what is written for it has been tried.
     pub about: &'static str,
-    /// Writes a netlist.
-    pub write: fn(&Netlist) -> String,
-    /// Reads one.
+    /// How expressions are spelled.
+    pub spelling: expr::Dialect,
+    /// Where a card's comment may stand.
+    pub comments: Comments,
+    /// How a `.save` card begins; empty where the simulator has none.
+    pub save: &'static str,
+    /// The same of `.print tran`.
+    pub print: &'static str,
+    /// A first word of `.options`, and what it needs besides what the netlist says.
+    pub options: (Option<&'static str>, &'static [&'static str]),
+    /// Whether linked sources and switches may take the current of any device that has one as an unknown (E, H, B),
+    /// not of V sources alone.
+    pub linked_to_any: bool,
+    /// What models of switches are called.
+    pub switches: Switches,
+    /// What it cannot say.
+    pub lacks: &'static [adapt::Lack],
+    /// Reads it.
     pub read: fn(&SourceMap, FileId, &mut Vec<Diagnostic>) -> Netlist,
 }
 
-/// Every dialect.
-pub const DIALECTS: &[Dialect] = &[Dialect {
+/// Where the comment of a card may stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comments {
+    /// Behind it, after `;`.
+    Behind,
+    /// On a line of its own only.
+    Above,
+}
+
+/// Models of switches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Switches {
+    /// `SW(vt vh ron roff)`, `CSW(it ih ron roff)`: on above vt + vh, off below vt − vh.
+    Threshold,
+    /// `VSWITCH(von voff ron roff)`, `ISWITCH(ion ioff ron roff)`: a smooth transition from one to the other.
+    Smooth,
+}
+
+/// ngspice.
+pub const NGSPICE: Dialect = Dialect {
     name: "ngspice",
-    about: "ngspice 39 and later, in its default mode; tested against it",
-    write: write::write,
+    about: "ngspice 39 and later, in its default mode; every shipped model runs in it",
+    spelling: expr::Dialect::Ngspice,
+    comments: Comments::Behind,
+    save: ".save",
+    print: ".print tran",
+    options: (None, &[]),
+    linked_to_any: true,
+    switches: Switches::Threshold,
+    lacks: &[],
     read: read::read,
-}];
+};
+
+/// Every dialect.
+pub const DIALECTS: &[Dialect] = &[
+    NGSPICE,
+    Dialect {
+        name: "xyce",
+        about: "Xyce 7, by its manual; untested",
+        spelling: expr::Dialect::Xyce,
+        comments: Comments::Behind,
+        // Its `.save` keeps an operating point; columns come from `.print`.
+        save: "",
+        print: ".print tran format=csv",
+        // Each variable is held to its own magnitude: with the default, pressures would hide displacements.
+        options: (Some("timeint"), &["newlte=3"]),
+        linked_to_any: false,
+        switches: Switches::Smooth,
+        lacks: &[adapt::CHARGED_LINE, adapt::SWITCHING_HYSTERESIS],
+        ..NGSPICE
+    },
+    Dialect {
+        name: "ltspice",
+        about: "LTspice 17 and later, by its manual; untested",
+        spelling: expr::Dialect::Ltspice,
+        print: "",
+        // Every point in double precision, none thinned out for plots.
+        options: (None, &["numdgt=15", "plotwinsize=0"]),
+        linked_to_any: false,
+        lacks: &[adapt::CHARGED_LINE],
+        ..NGSPICE
+    },
+    Dialect {
+        name: "gnucap",
+        about: "gnucap 0.36: linear models only; those among the shipped ones run in it",
+        comments: Comments::Above,
+        save: "",
+        options: (None, &["numdgt=9"]),
+        linked_to_any: false,
+        lacks: &[adapt::LAW, adapt::SWITCH, adapt::DIODE, adapt::CHARGED_LINE],
+        ..NGSPICE
+    },
+];
+
+impl Dialect {
+    /// The netlist in the words of the dialect, and its text. `None`, with an error for each card that it cannot say.
+    pub fn write(&self, netlist: &Netlist, d: &mut Vec<Diagnostic>) -> Option<Written> {
+        let Adapted { netlist, senses } = adapt::adapt(netlist, self, d)?;
+        Some(Written { text: write::text(&netlist, self), senses, netlist })
+    }
+}
+
+/// A netlist in a dialect.
+pub struct Written {
+    /// As cards.
+    pub netlist: Netlist,
+    /// As text.
+    pub text: String,
+    /// What was added: 0 V sources that carry the current of another device, each with that device's name.
+    pub senses: Vec<(String, String)>,
+}
 
 /// The dialect of a name.
 pub fn find(name: &str) -> Option<&'static Dialect> {
@@ -40,9 +143,10 @@ mod tests {
             let mut map = SourceMap::default();
             let file = map.add("deck.cir", "a title\nr1 a 0 1000\nv1 a 0 5\n.op\n.end\n");
             let mut d = vec![];
-            let text = (dialect.write)(&(dialect.read)(&map, file, &mut d));
+            let write = |netlist: &Netlist| dialect.write(netlist, &mut vec![]).unwrap().text;
+            let text = write(&(dialect.read)(&map, file, &mut d));
             let file = map.add("again.cir", text.clone());
-            assert_eq!((dialect.write)(&(dialect.read)(&map, file, &mut d)), text);
+            assert_eq!(write(&(dialect.read)(&map, file, &mut d)), text);
             assert!(d.is_empty() && find(&dialect.name.to_uppercase()).is_some(), "{d:?}");
         }
         assert!(find("nosuch").is_none());

@@ -5,6 +5,7 @@
 //!
 //! | key | value | meaning |
 //! |---|---|---|
+//! | `dialect` | `xyce` | the simulator that it was written for, when that is not ngspice |
 //! | `hmax` | `auto` | the step limit of `.tran` is for other simulators |
 //! | `grid` | seconds | rows at 0, grid, 2·grid … to the end of `.tran`, both included |
 //! | `option` | `reltol=1e-6` | an option of the run; wins over `.options` |
@@ -15,7 +16,7 @@
 //! | `domain` | `hydraulic 1e6 1e-5 v(a) i(V_b)` | domain, usual magnitudes of its effort and flow in SI, variables |
 //! | `column` | `["pump pressure","bar","v(a)/100000"]` | an output column: header, unit, value, as JSON |
 //!
-//! Keys other than `hmax` and `grid` repeat. Unknown keys are skipped: a newer version may have written them.
+//! Keys other than `dialect`, `hmax` and `grid` repeat. Unknown keys are skipped: a newer version may have written them.
 
 use crate::expr::print::number;
 

@@ -6,6 +6,7 @@ pub mod read;
 pub mod write;
 pub mod flatten;
 pub mod dialects;
+pub mod adapt;
 
 use crate::expr;
 use crate::source::Span;

@@ -1,10 +1,11 @@
-//! Writes a netlist as text for ngspice, in the forms that other simulators read alike.
+//! Writes a netlist as text, in the forms that every simulator of SPICE's family reads alike; where they differ, the row of
+//! the dialect says how (`dialects.rs`).
 //!
 //! Lines stay under 80 columns: a longer card goes on behind `+`, broken at blanks. Numbers carry no suffix. A card's
 //! comment stands at the end of its line where there is room, else on a line above.
 
+use super::dialects::{Comments, Dialect, NGSPICE};
 use super::{Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Shape, Waveform};
-use crate::expr::functions::Dialect;
 use crate::expr::print::{number, print};
 
 /// Lines are shorter than this.
@@ -14,92 +15,120 @@ const COMMENT: usize = 44;
 /// The same behind a parameter.
 const PARAMETER_COMMENT: usize = 26;
 
-/// The text of a netlist.
+/// The text of a netlist for ngspice.
 pub fn write(netlist: &Netlist) -> String {
+    text(netlist, &NGSPICE)
+}
+
+/// The names of a netlist and the dialect that they are written in.
+#[derive(Clone, Copy)]
+struct Form<'a> {
+    names: &'a Names,
+    dialect: &'a Dialect,
+}
+
+impl Form<'_> {
+    fn name(&self, name: Name) -> String {
+        self.names.text(name).to_string()
+    }
+
+    fn expression(&self, expr: &Expr) -> String {
+        print(expr, self.dialect.spelling, &mut |leaf| match leaf {
+            Leaf::Parameter(name) => self.name(*name),
+            Leaf::Voltage(plus, None) => format!("v({})", self.name(*plus)),
+            Leaf::Voltage(plus, Some(minus)) => {
+                format!("v({},{})", self.name(*plus), self.name(*minus))
+            }
+            Leaf::Current(device) => format!("i({})", self.name(*device)),
+            Leaf::Time => "time".to_string(),
+        })
+    }
+}
+
+/// The text of a netlist that the dialect can say (`dialects::Dialect::write` sees to that).
+pub(super) fn text(netlist: &Netlist, dialect: &Dialect) -> String {
+    let form = Form { names: &netlist.names, dialect };
     let mut text = String::new();
     text.push_str(&netlist.title.replace(['\n', '\r'], " "));
     text.push('\n');
     for (key, value) in &netlist.header {
         text.push_str(&format!("*bondspice {key}={value}\n"));
     }
-    cards(&mut text, &netlist.names, &netlist.cards);
+    cards(&mut text, form, &netlist.cards);
     text.push_str(".end\n");
     text
 }
 
-/// An expression as a netlist writes it.
+/// An expression as a netlist for ngspice writes it.
 pub fn expression(names: &Names, expr: &Expr) -> String {
-    print(expr, Dialect::Ngspice, &mut |leaf| match leaf {
-        Leaf::Parameter(name) => names.text(*name).to_string(),
-        Leaf::Voltage(plus, None) => format!("v({})", names.text(*plus)),
-        Leaf::Voltage(plus, Some(minus)) => {
-            format!("v({},{})", names.text(*plus), names.text(*minus))
-        }
-        Leaf::Current(device) => format!("i({})", names.text(*device)),
-        Leaf::Time => "time".to_string(),
-    })
+    Form { names, dialect: &NGSPICE }.expression(expr)
 }
 
-/// A card that holds no others, on one line.
+/// A card that holds no others, on one line, as for ngspice.
 pub fn card(names: &Names, kind: &CardKind) -> String {
-    words(names, kind).join(" ")
+    words(Form { names, dialect: &NGSPICE }, kind).join(" ")
 }
 
-fn cards(text: &mut String, names: &Names, cards: &[Card]) {
+fn cards(text: &mut String, form: Form, cards: &[Card]) {
     for card in cards {
         match &card.kind {
             CardKind::Comment(comment) => text.push_str(&format!("*{comment}\n")),
             CardKind::Subcircuit(subcircuit) => {
-                let mut words = vec![".subckt".to_string(), names.text(subcircuit.name).into()];
-                words.extend(subcircuit.ports.iter().map(|port| names.text(*port).to_string()));
-                words.extend(assignments(names, &subcircuit.parameters));
-                line(text, &words, card.comment.as_deref());
-                self::cards(text, names, &subcircuit.cards);
-                line(text, &[".ends".into(), names.text(subcircuit.name).into()], None);
+                let mut words = vec![".subckt".to_string(), form.name(subcircuit.name)];
+                words.extend(subcircuit.ports.iter().map(|port| form.name(*port)));
+                words.extend(assignments(form, &subcircuit.parameters));
+                line(text, &words, card.comment.as_deref(), form.dialect.comments);
+                self::cards(text, form, &subcircuit.cards);
+                line(text, &[".ends".into(), form.name(subcircuit.name)], None, form.dialect.comments);
             }
-            kind => line(text, &words(names, kind), card.comment.as_deref()),
+            kind => line(text, &words(form, kind), card.comment.as_deref(), form.dialect.comments),
         }
     }
 }
 
 /// The words of a card, between which a line may be broken.
-fn words(names: &Names, kind: &CardKind) -> Vec<String> {
+fn words(form: Form, kind: &CardKind) -> Vec<String> {
     let word = |text: &str| text.to_string();
     match kind {
-        CardKind::Device(device) => device_words(names, device),
+        CardKind::Device(device) => device_words(form, device),
         CardKind::Parameters(parameters) => {
-            std::iter::once(word(".param")).chain(assignments(names, parameters)).collect()
+            std::iter::once(word(".param")).chain(assignments(form, parameters)).collect()
         }
         CardKind::Model { name, kind, parameters } => {
-            let mut words = vec![word(".model"), word(names.text(*name)), format!("{kind}(")];
+            let mut words = vec![word(".model"), form.name(*name), format!("{kind}(")];
             words.extend(
-                parameters.iter().map(|(key, expr)| format!("{key}={}", value(names, expr))),
+                parameters.iter().map(|(key, expr)| format!("{key}={}", value(form, expr))),
             );
             words.push(word(")"));
             words
         }
         CardKind::Options(options) => std::iter::once(word(".options"))
+            .chain(form.dialect.options.0.map(word))
             .chain(options.iter().map(|(key, value)| format!("{key}={value}")))
+            .chain(form.dialect.options.1.iter().map(|more| word(more)))
             .collect(),
         CardKind::Initial(values) => std::iter::once(word(".ic"))
             .chain(
                 values
                     .iter()
-                    .map(|(node, expr)| format!("v({})={}", names.text(*node), value(names, expr))),
+                    .map(|(node, expr)| format!("v({})={}", form.name(*node), value(form, expr))),
             )
             .collect(),
         CardKind::Save { print, items } => {
-            let mut words =
-                if *print { vec![word(".print"), word("tran")] } else { vec![word(".save")] };
+            let saves = if *print { form.dialect.print } else { form.dialect.save };
+            if saves.is_empty() {
+                return vec![];
+            }
+            let mut words: Vec<String> = saves.split(' ').map(word).collect();
             words.extend(items.iter().map(|(text, _)| text.clone()));
             words
         }
         CardKind::Transient { step, stop, start, hmax, uic } => {
-            let mut words = vec![word(".tran"), value(names, step), value(names, stop)];
+            let mut words = vec![word(".tran"), value(form, step), value(form, stop)];
             if start.is_some() || hmax.is_some() {
-                words.push(start.as_ref().map_or(word("0"), |start| value(names, start)));
+                words.push(start.as_ref().map_or(word("0"), |start| value(form, start)));
             }
-            words.extend(hmax.as_ref().map(|hmax| value(names, hmax)));
+            words.extend(hmax.as_ref().map(|hmax| value(form, hmax)));
             words.extend(uic.then(|| word("uic")));
             words
         }
@@ -108,33 +137,33 @@ fn words(names: &Names, kind: &CardKind) -> Vec<String> {
     }
 }
 
-fn device_words(names: &Names, device: &Device) -> Vec<String> {
-    let name = |name: &Name| names.text(*name).to_string();
+fn device_words(form: Form, device: &Device) -> Vec<String> {
+    let name = |name: &Name| form.name(*name);
     let full = name(&device.name);
     let behavioural = full.starts_with(['B', 'b']);
     let mut words = vec![full];
     words.extend(device.nodes.iter().map(name));
     let law = |key: &str, law: &Expr| {
         let key = if behavioural { key } else { "VALUE" };
-        vec![format!("{key}={{{}}}", breakable(&expression(names, law)))]
+        vec![format!("{key}={{{}}}", breakable(&form.expression(law)))]
     };
     let initial = |initial: &Option<Expr>| {
-        initial.as_ref().map(|initial| format!("IC={}", value(names, initial)))
+        initial.as_ref().map(|initial| format!("IC={}", value(form, initial)))
     };
     let state = |on: &Option<bool>| on.map(|on| if on { "ON" } else { "OFF" }.to_string());
     match &device.element {
-        Element::Resistor { value: resistance } => words.push(value(names, resistance)),
+        Element::Resistor { value: resistance } => words.push(value(form, resistance)),
         Element::Capacitor { value: size, initial: ic }
         | Element::Inductor { value: size, initial: ic } => {
-            words.push(value(names, size));
+            words.push(value(form, size));
             words.extend(initial(ic));
         }
         Element::Mutual { inductors, coupling } => {
             words.extend(inductors.iter().map(name));
-            words.push(value(names, coupling));
+            words.push(value(form, coupling));
         }
         Element::VoltageSource(waveform) | Element::CurrentSource(waveform) => match waveform {
-            Waveform::Constant(constant) => words.push(value(names, constant)),
+            Waveform::Constant(constant) => words.push(value(form, constant)),
             Waveform::Function { shape, arguments } => {
                 let shape = match shape {
                     Shape::Pulse => "PULSE",
@@ -144,7 +173,7 @@ fn device_words(names: &Names, device: &Device) -> Vec<String> {
                     Shape::Sffm => "SFFM",
                 };
                 let mut arguments: Vec<String> =
-                    arguments.iter().map(|argument| value(names, argument)).collect();
+                    arguments.iter().map(|argument| value(form, argument)).collect();
                 match arguments.first_mut() {
                     Some(first) => *first = format!("{shape}({first}"),
                     None => arguments.push(format!("{shape}(")),
@@ -157,17 +186,17 @@ fn device_words(names: &Names, device: &Device) -> Vec<String> {
         },
         Element::Vcvs { gain, control } | Element::Vccs { gain, control } => {
             words.extend(control.iter().map(name));
-            words.push(value(names, gain));
+            words.push(value(form, gain));
         }
         Element::Cccs { gain, control } | Element::Ccvs { gain, control } => {
             words.push(name(control));
-            words.push(value(names, gain));
+            words.push(value(form, gain));
         }
         Element::Line { impedance, delay, initial } => {
-            words.push(format!("Z0={}", value(names, impedance)));
-            words.push(format!("TD={}", value(names, delay)));
+            words.push(format!("Z0={}", value(form, impedance)));
+            words.push(format!("TD={}", value(form, delay)));
             words.extend(initial.as_ref().map(|initial| {
-                let values: Vec<String> = initial.iter().map(|v| value(names, v)).collect();
+                let values: Vec<String> = initial.iter().map(|v| value(form, v)).collect();
                 format!("IC={}", values.join(","))
             }));
         }
@@ -184,28 +213,28 @@ fn device_words(names: &Names, device: &Device) -> Vec<String> {
         }
         Element::Diode { model, area } => {
             words.push(name(model));
-            words.extend(area.as_ref().map(|area| value(names, area)));
+            words.extend(area.as_ref().map(|area| value(form, area)));
         }
         Element::Instance { subcircuit, parameters } => {
             words.push(name(subcircuit));
-            words.extend(assignments(names, parameters));
+            words.extend(assignments(form, parameters));
         }
     }
     words
 }
 
-fn assignments(names: &Names, parameters: &[(Name, Expr)]) -> Vec<String> {
+fn assignments(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {
     parameters
         .iter()
-        .map(|(name, expr)| format!("{}={}", names.text(*name), value(names, expr)))
+        .map(|(name, expr)| format!("{}={}", form.name(*name), value(form, expr)))
         .collect()
 }
 
 /// A number as it is, anything else in braces.
-fn value(names: &Names, expr: &Expr) -> String {
+fn value(form: Form, expr: &Expr) -> String {
     match expr.as_number() {
         Some(value) => number(value),
-        None => format!("{{{}}}", expression(names, expr)),
+        None => format!("{{{}}}", form.expression(expr)),
     }
 }
 
@@ -238,8 +267,11 @@ fn breakable(text: &str) -> String {
     marked
 }
 
-/// Adds a card of words, broken into lines, with its comment.
-fn line(text: &mut String, words: &[String], comment: Option<&str>) {
+/// Adds a card of words, broken into lines, with its comment; nothing of no words.
+fn line(text: &mut String, words: &[String], comment: Option<&str>, comments: Comments) {
+    if words.is_empty() {
+        return;
+    }
     let mut lines: Vec<String> = vec![String::new()];
     for word in words.iter().flat_map(|word| word.split(' ')) {
         for (index, piece) in word.split(BREAK).enumerate() {
@@ -256,7 +288,10 @@ fn line(text: &mut String, words: &[String], comment: Option<&str>) {
     let comment = comment.map(|comment| comment.replace(['\n', '\r'], " "));
     match (comment, lines.as_mut_slice()) {
         (None, _) => {}
-        (Some(comment), [only]) if only.len() + 3 + comment.chars().count() < WIDTH => {
+        (Some(comment), [only])
+            if comments == Comments::Behind
+                && only.len() + 3 + comment.chars().count() < WIDTH =>
+        {
             let column = if words.first().is_some_and(|word| word == ".param") {
                 PARAMETER_COMMENT
             } else {
