@@ -6,8 +6,10 @@ use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session, same_file};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::write;
+use crate::netlist::dialects::{self, DIALECTS};
+use crate::quantity::nearest;
 use crate::source::Span;
+use crate::translate::map::MapCard;
 use std::path::Path;
 
 /// What it does, in a line.
@@ -16,9 +18,6 @@ pub const ABOUT: &str = "Turn a bond graph into a netlist";
 /// An example for the help.
 pub const EXAMPLE: &str = "Example: bondspice convert model.bg -o model.cir --map map.json\n         \
 bondspice convert model.bg | ngspice -b";
-
-/// Simulators whose netlists are asked for and not written yet.
-const PLANNED: &[&str] = &["xyce", "ltspice", "gnucap", "saber"];
 
 /// Its flags.
 #[derive(clap::Args)]
@@ -30,7 +29,7 @@ pub struct Arguments {
     /// Where to write the netlist
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
-    /// The simulator that shall read it: ngspice
+    /// The simulator that shall read it: ngspice, xyce, ltspice, gnucap
     #[arg(long, value_name = "SIMULATOR", default_value = "ngspice")]
     to: String,
     /// Where to write the map: which circuit variable is which effort or flow
@@ -50,15 +49,9 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 }
 
 fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
-    let to = arguments.to.to_lowercase();
-    if to != "ngspice" {
-        let message = if PLANNED.contains(&to.as_str()) {
-            format!("netlists for {to} cannot be written yet, only for ngspice")
-        } else {
-            format!("no simulator is called `{}`; netlists are written for ngspice", arguments.to)
-        };
-        return Err(session.fail(Diagnostic::error("E0943", Span::NONE, message)));
-    }
+    let Some(dialect) = dialects::find(&arguments.to) else {
+        return Err(session.fail(unknown(&arguments.to)));
+    };
     if arguments.emit.is_none() && one_output(arguments) {
         let message = "the netlist and the map cannot be written to one place";
         let error = Diagnostic::error("E0940", Span::NONE, message);
@@ -75,18 +68,42 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
     let Some(model) = model else { return Err(session.exit()) };
-    if session.global.verbose {
-        session.remark(&format!("{}: {}", model.graph.name, model.translation.figures));
+    let mut d = vec![];
+    let written = dialect.write(&model.translation.netlist, &mut d);
+    session.say(d);
+    let Some(written) = written else { return Err(session.exit()) };
+    write_text(arguments.output.as_deref(), &written.text, session)?;
+    // The map holds what was added, too.
+    let mut map = model.translation.map;
+    map.dialect = dialect.name;
+    for (card, of) in written.senses {
+        map.figures.nodes += 1;
+        map.figures.devices += 1;
+        map.figures.helpers += 1;
+        let element = format!("current of {of}");
+        map.cards.push(MapCard { card, element, bond: None, line: None });
     }
-    let text = write::write(&model.translation.netlist);
-    write_text(arguments.output.as_deref(), &text, session)?;
+    if session.global.verbose {
+        session.remark(&format!("{}: {}", model.graph.name, map.figures));
+    }
     if let Some(name) = &arguments.map {
-        let map = serde_json::to_string_pretty(
-            &model.translation.map.json(&model.translation.netlist.names),
-        );
+        let map = serde_json::to_string_pretty(&map.json(&written.netlist.names));
         write_text(Some(name), &(map.unwrap_or_default() + "\n"), session)?;
     }
     Ok(())
+}
+
+/// What is said of a simulator that has no row.
+fn unknown(name: &str) -> Diagnostic {
+    let names = || DIALECTS.iter().map(|dialect| dialect.name);
+    let error = Diagnostic::error("E0943", Span::NONE, format!("no simulator is called `{name}`"));
+    match nearest(&name.to_lowercase(), names()) {
+        Some(meant) => error.help(format!("did you mean `{meant}`?")),
+        None => {
+            let names: Vec<&str> = names().collect();
+            error.help(format!("netlists are written for {}", names.join(", ")))
+        }
+    }
 }
 
 /// Whether the netlist and the map would go to one file, or both to standard output.

@@ -147,6 +147,7 @@ pub const CODES: &[Code] = &[
     row("E0602", "quantity is in no circuit variable", "The quantity is left undetermined by the junctions, or is no variable of its element, so that no node or current of the circuit holds it. Observe another variable."),
     row("E0603", "too many random numbers", "In a netlist `noise` is a piecewise linear source with a step for each random number until the end of the run. Hold each number for longer, or end the run earlier."),
     row("E0604", "junctions contradict a source", "Round a loop of junctions, what flows out of a 0-junction comes back to it (or what rises at a 1-junction falls again), so that nothing is left for the source: its flow, or its effort, is 0 whatever the elements are. Usually a half arrow of the loop points the wrong way, or a bond was drawn that joins what was joined already."),
+    row("E0605", "dialect has no words for it", "The simulator that the netlist is asked for cannot express an element: gnucap reads linear elements only, Xyce's switches have no hysteresis, the lines of Xyce and LTspice begin at rest. Choose another simulator, or another model of the element."),
     row("W0601", "junctions force a variable to 0", "Round a loop of junctions, what flows out of a 0-junction comes back to it (or what rises at a 1-junction falls again), so that nothing is left for the element: its flow, or its effort, is 0 whatever its law says. Usually a half arrow of the loop points the wrong way, or a bond was drawn that joins what was joined already."),
     // -- 07: netlists and circuits
     row("E0701", "not a card", "A line of a netlist begins with the letter of a device, a dot, an asterisk or a plus sign; of the cards with a dot, the known ones are named in the manual."),
@@ -220,7 +221,7 @@ pub const CODES: &[Code] = &[
     row("E0940", "wrong use of a flag", "The message says which flag and what it takes; `--help` shows an example."),
     row("E0941", "unknown format", "The format of a result follows from --format, else from the ending of -o: csv, raw, json."),
     row("E0942", "nothing to compare", "No signal of the reference has a column in the trace. Pair names that differ with --signals."),
-    row("E0943", "simulator or dialect that is not known yet", "Netlists are written for and read as ngspice's; others are planned."),
+    row("E0943", "simulator or dialect that is not known yet", "Netlists are written for the simulators that `bondspice convert --help` lists."),
     row("E0944", "flag that does not fit the input", "Netlists have parameters and columns but no inputs, graph or causality; bond graphs have all of them."),
     row("E0945", "two columns of one name", "The headers of a result must differ. Give one of the columns another name with `as`."),
     row("E0948", "no such example", "`bondspice examples` lists the models that come with the program; a name stands with its folder, as in `textbook/A1`."),

@@ -92,7 +92,7 @@ pub fn adapt(netlist: &Netlist, dialect: &Dialect, d: &mut Vec<Diagnostic>) -> O
         for lack in dialect.lacks.iter().filter(|lack| (lack.needed)(&device.element, &models)) {
             let name = netlist.names.text(device.name);
             let message = format!("{} cannot say {}: `{name}`", dialect.name, lack.what);
-            let error = Diagnostic::error("E0604", card.span, message).help(lack.help);
+            let error = Diagnostic::error("E0605", card.span, message).help(lack.help);
             // What stands for the element, when the netlist is that of a bond graph.
             d.push(match &card.comment {
                 Some(comment) => error.because(format!("it stands for {comment}")),

@@ -79,7 +79,12 @@ fn cards(text: &mut String, form: Form, cards: &[Card]) {
                 words.extend(assignments(form, &subcircuit.parameters));
                 line(text, &words, card.comment.as_deref(), form.dialect.comments);
                 self::cards(text, form, &subcircuit.cards);
-                line(text, &[".ends".into(), form.name(subcircuit.name)], None, form.dialect.comments);
+                line(
+                    text,
+                    &[".ends".into(), form.name(subcircuit.name)],
+                    None,
+                    form.dialect.comments,
+                );
             }
             kind => line(text, &words(form, kind), card.comment.as_deref(), form.dialect.comments),
         }
@@ -289,8 +294,7 @@ fn line(text: &mut String, words: &[String], comment: Option<&str>, comments: Co
     match (comment, lines.as_mut_slice()) {
         (None, _) => {}
         (Some(comment), [only])
-            if comments == Comments::Behind
-                && only.len() + 3 + comment.chars().count() < WIDTH =>
+            if comments == Comments::Behind && only.len() + 3 + comment.chars().count() < WIDTH =>
         {
             let column = if words.first().is_some_and(|word| word == ".param") {
                 PARAMETER_COMMENT

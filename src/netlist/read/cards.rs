@@ -213,9 +213,16 @@ fn model(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     Some(CardKind::Model { name, kind: kind.to_lowercase(), parameters })
 }
 
-/// `.options key=value flag …`. Numbers lose their suffixes.
+/// The parts of Xyce that `.options` may name first.
+const PACKAGES: &[&str] =
+    &["timeint", "nonlin", "nonlin-tran", "device", "linsol", "output", "measure"];
+
+/// `.options [package] key=value flag …`. Numbers lose their suffixes.
 fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     let mut options = vec![];
+    if PACKAGES.contains(&cursor.next_word().to_lowercase().as_str()) {
+        cursor.word();
+    }
     while !cursor.is_done() {
         if let Some((key, _)) = cursor.key() {
             let (word, from) = cursor.word();
@@ -287,6 +294,9 @@ fn transient(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     Some(CardKind::Transient { step, stop, start: values.next(), hmax: values.next(), uic })
 }
 
+/// How Xyce's `.print` says where columns go and what they look like.
+const LAYOUT: &[&str] = &["format", "file", "width", "precision"];
+
 /// `.save v(a) i(l1) {expression} node …`; `.print tran …`. No items at all mean everything.
 fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKind> {
     if print {
@@ -302,6 +312,12 @@ fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKin
     }
     let (mut items, mut all) = (vec![], false);
     while !cursor.is_done() {
+        let mut ahead = *cursor;
+        if ahead.key().is_some_and(|(key, _)| LAYOUT.contains(&key.to_lowercase().as_str())) {
+            ahead.word();
+            *cursor = ahead;
+            continue;
+        }
         let from = cursor.at;
         let to = end_of_item(cursor);
         cursor.at = to;

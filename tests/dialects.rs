@@ -1,0 +1,171 @@
+//! Netlists for other simulators than ngspice: what is written is the same circuit, and what can be run agrees.
+
+mod translated;
+
+use bondspice::bond::elaborate::Overrides;
+use bondspice::circuit::{Circuit, DeviceKind, Expr, Leaf};
+use bondspice::netlist::dialects::{self, DIALECTS, Written};
+use bondspice::netlist::{Netlist, flatten::flatten};
+use bondspice::source::SourceMap;
+use std::collections::HashMap;
+use std::path::Path;
+use std::process::Command;
+use translated::{models, translated};
+
+fn written(netlist: &Netlist, dialect: &str) -> Result<Written, Vec<String>> {
+    let mut d = vec![];
+    let written = dialects::find(dialect).unwrap().write(netlist, &mut d);
+    written.ok_or_else(|| d.iter().map(|d| format!("{} {}", d.code, d.message)).collect())
+}
+
+/// The flat circuit of a text.
+fn flat(text: &str) -> Circuit {
+    let mut map = SourceMap::default();
+    let file = map.add("deck.cir", text);
+    let mut d = vec![];
+    let netlist = bondspice::netlist::read::read(&map, file, &mut d);
+    assert!(d.is_empty(), "{d:?}\n{text}");
+    flatten(&netlist, &mut d).unwrap_or_else(|| panic!("{d:?}\n{text}"))
+}
+
+/// The value of a law where each voltage and current has a value that follows from its name.
+fn value(circuit: &Circuit, law: &Expr, draw: f64) -> f64 {
+    let named = |name: &str| {
+        let sum: f64 = name
+            .to_lowercase()
+            .bytes()
+            .enumerate()
+            .map(|(k, b)| (k as f64 + draw) * f64::from(b))
+            .sum();
+        (sum * draw).sin()
+    };
+    let node = |id: u32| match id {
+        0 => 0.0,
+        id => named(&circuit.nodes[id as usize].name),
+    };
+    law.evaluate(&mut |leaf| match leaf {
+        Leaf::Voltage(a, b) => node(a.0) - node(b.0),
+        Leaf::Current(device) => named(&circuit.devices[device.0 as usize].name),
+        Leaf::Time => draw,
+    })
+}
+
+/// Every device of one circuit stands in the other, between nodes of the same names, with the same value or law, but
+/// that the second end of those in `sensed` may lead to their 0 V source.
+fn same(a: &Circuit, b: &Circuit, senses: &[(String, String)], what: &str) {
+    let others: HashMap<String, _> = b.devices.iter().map(|d| (d.name.to_lowercase(), d)).collect();
+    assert_eq!(a.devices.len() + senses.len(), b.devices.len(), "{what}");
+    for device in &a.devices {
+        let name = device.name.to_lowercase();
+        let other = others.get(&name).unwrap_or_else(|| panic!("{what}: {name} is missing"));
+        let sensed = senses.iter().any(|(_, of)| of.to_lowercase() == name);
+        for (k, (x, y)) in device.nodes.iter().zip(&other.nodes).enumerate() {
+            let (x, y) = (&a.nodes[x.0 as usize].name, &b.nodes[y.0 as usize].name);
+            assert!(x.eq_ignore_ascii_case(y) || (sensed && k == 1), "{what}: {name} {x} {y}");
+        }
+        match (&device.kind, &other.kind) {
+            (
+                DeviceKind::BehaviouralVoltage { law: x },
+                DeviceKind::BehaviouralVoltage { law: y },
+            )
+            | (
+                DeviceKind::BehaviouralCurrent { law: x },
+                DeviceKind::BehaviouralCurrent { law: y },
+            ) => {
+                for draw in [0.37, 1.9, -2.3, 11.0, 0.004] {
+                    let (x, y) = (value(a, x, draw), value(b, y, draw));
+                    let alike =
+                        x == y || (x - y).abs() <= 1e-12 * x.abs() || x.is_nan() && y.is_nan();
+                    assert!(alike, "{what}: {name} at {draw}: {x} {y}");
+                }
+            }
+            // The controlling device has another number, and another name where it is sensed.
+            (DeviceKind::Cccs { gain: x, .. }, DeviceKind::Cccs { gain: y, .. })
+            | (DeviceKind::Ccvs { gain: x, .. }, DeviceKind::Ccvs { gain: y, .. }) => {
+                assert_eq!(x, y, "{what}: {name}")
+            }
+            (DeviceKind::Mutual { coupling: x, .. }, DeviceKind::Mutual { coupling: y, .. }) => {
+                assert_eq!(x, y)
+            }
+            (DeviceKind::Vcvs { gain: x, .. }, DeviceKind::Vcvs { gain: y, .. })
+            | (DeviceKind::Vccs { gain: x, .. }, DeviceKind::Vccs { gain: y, .. }) => {
+                assert_eq!(x, y, "{what}: {name}")
+            }
+            (x, y) => assert_eq!(format!("{x:?}"), format!("{y:?}"), "{what}: {name}"),
+        }
+    }
+}
+
+#[test]
+fn every_dialect_says_the_same_circuit() {
+    let mut refused = vec![];
+    for model in models() {
+        let netlist = translated(&model, &Overrides::default()).translation.netlist;
+        let first = flat(&written(&netlist, "ngspice").unwrap_or_else(|d| panic!("{d:?}")).text);
+        for dialect in DIALECTS.iter().skip(1) {
+            let what = format!("{} in {}", model.display(), dialect.name);
+            match written(&netlist, dialect.name) {
+                Ok(written) => same(&first, &flat(&written.text), &written.senses, &what),
+                Err(why) if dialect.name == "gnucap" => {
+                    assert!(why[0].starts_with("E0605"), "{what}")
+                }
+                Err(why) => refused.push(format!("{what}: {}", why.join("; "))),
+            }
+        }
+    }
+    // What follows from a switch with two thresholds, and nothing else.
+    assert!(
+        refused.iter().all(|what| what.contains("xyce cannot say a switch with two thresholds")),
+        "{refused:#?}"
+    );
+    println!("{refused:#?}");
+}
+
+#[test]
+fn spellings_of_conditions_and_tables() {
+    let text = "t\n.param k=2\nv1 a 0 1\nr1 a 0 1\n\
+                b1 b 0 v={(v(a) > k) + (v(a) > 1 && !(v(a) == 2))}\n\
+                b2 c 0 v={v(a) ? table(v(a), 0,1, 2,5) : 3}\n.op\n.end\n";
+    let mut map = SourceMap::default();
+    let file = map.add("deck.cir", text);
+    let mut d = vec![];
+    let netlist = bondspice::netlist::read::read(&map, file, &mut d);
+    let laws = |dialect: &str| {
+        let text = written(&netlist, dialect).unwrap_or_else(|d| panic!("{d:?}")).text;
+        let laws = text
+            .replace("\n+ ", "")
+            .lines()
+            .filter(|line| line.starts_with('b'))
+            .map(str::to_string)
+            .collect::<Vec<_>>();
+        let circuit = flat(&text);
+        same(
+            &flat(&written(&netlist, "ngspice").unwrap_or_else(|d| panic!("{d:?}")).text),
+            &circuit,
+            &[],
+            dialect,
+        );
+        laws
+    };
+    assert_eq!(
+        laws("ngspice"),
+        [
+            "b1 b 0 V={(v(a) > k)+((v(a) > 1) && (!(v(a) == 2)))}",
+            "b2 c 0 V={((v(a)) ? (pwl(min(max(v(a),0),2),0,1,2,5)) : (3))}"
+        ]
+    );
+    assert_eq!(
+        laws("xyce"),
+        [
+            "b1 b 0 V={if((v(a) > k),1,0)+if(((v(a) > 1) && (!(v(a) == 2))),1,0)}",
+            "b2 c 0 V={if((abs(v(a)) > 0),table(v(a),0,1,2,5),3)}"
+        ]
+    );
+    assert_eq!(
+        laws("ltspice"),
+        [
+            "b1 b 0 V={if((v(a) > k),1,0)+if(((v(a) > 1) & (!(abs(v(a)-(2)) <= 0))),1,0)}",
+            "b2 c 0 V={if((abs(v(a)) > 0),table(v(a),0,1,2,5),3)}"
+        ]
+    );
+}
