@@ -4,11 +4,12 @@ mod translated;
 
 use bondspice::bond::elaborate::Overrides;
 use bondspice::circuit::{Circuit, DeviceKind, Expr, Leaf};
+use bondspice::cli::pipeline::run_text;
 use bondspice::netlist::dialects::{self, DIALECTS, Written};
 use bondspice::netlist::{Netlist, flatten::flatten};
 use bondspice::source::SourceMap;
+use bondspice::trace::{Trace, compare};
 use std::collections::HashMap;
-use std::path::Path;
 use std::process::Command;
 use translated::{models, translated};
 
@@ -168,4 +169,108 @@ fn spellings_of_conditions_and_tables() {
             "b2 c 0 V={if((abs(v(a)) > 0),table(v(a),0,1,2,5),3)}"
         ]
     );
+}
+
+/// Whether gnucap is there; where it must be and is not, the test fails.
+fn gnucap() -> bool {
+    let found = Command::new("gnucap").arg("--version").output().is_ok();
+    if !found {
+        let required = std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_some_and(|v| v == "1");
+        assert!(!required, "gnucap is missing");
+        eprintln!("skipped: gnucap is missing");
+    }
+    found
+}
+
+/// `12.5Meg`, `-7.99u`, `540.8314G`, and `1.2e-15`.
+fn number(text: &str) -> f64 {
+    let letters =
+        text.find(|c: char| c.is_ascii_alphabetic() && c != 'E' && c != 'e').unwrap_or(text.len());
+    let (digits, suffix) = text.split_at(letters);
+    let exponent = match suffix {
+        "" => 0,
+        "f" => -15,
+        "p" => -12,
+        "n" => -9,
+        "u" => -6,
+        "m" => -3,
+        "K" => 3,
+        "Meg" => 6,
+        "G" => 9,
+        "T" => 12,
+        other => panic!("{text}: {other}"),
+    };
+    format!("{}e{exponent}", digits.trim_end_matches('.')).parse().unwrap_or_else(|_| {
+        digits.parse::<f64>().unwrap_or_else(|_| panic!("{text}")) * 10f64.powi(exponent)
+    })
+}
+
+/// What gnucap makes of a text: its columns by name. The row at 0 is left out: before its first step gnucap shows
+/// sources as if they fed a short.
+fn run(text: &str, what: &str) -> Trace {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("deck.cir");
+    std::fs::write(&deck, text).unwrap();
+    let output = Command::new("gnucap").arg("-b").arg(&deck).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).to_string();
+    assert!(!said.contains('?'), "{what}: {said:.2000}");
+    let mut lines = said.lines().skip_while(|line| !line.starts_with('#'));
+    let head = lines.next().unwrap_or_else(|| panic!("{what}: {said}"));
+    let names: Vec<String> = head[1..].split_whitespace().map(str::to_lowercase).collect();
+    let mut trace = Trace::new(names.clone(), vec![]);
+    for line in lines.skip(1) {
+        let values: Vec<f64> = line.split_whitespace().map(number).collect();
+        if values.len() == names.len() {
+            for (column, value) in trace.columns.iter_mut().zip(values) {
+                column.push(value);
+            }
+        }
+    }
+    trace
+}
+
+/// The rows of a trace at other times.
+fn without(trace: &Trace, times: &[f64]) -> Trace {
+    let keeps: Vec<bool> =
+        trace.time().iter().map(|t| times.iter().all(|jump| (t - jump).abs() > 1e-9)).collect();
+    let mut rest = Trace::new(trace.names.clone(), vec![]);
+    for (column, all) in rest.columns.iter_mut().zip(&trace.columns) {
+        column.extend(all.iter().zip(&keeps).filter(|(_, keep)| **keep).map(|(value, _)| *value));
+    }
+    rest
+}
+
+/// Linear models in gnucap against our own run of the same circuit, each voltage and current that is saved. 1e-3 of
+/// the range of each: gnucap takes ten steps of the trapezoidal rule a row.
+#[test]
+fn linear_models_in_gnucap() {
+    if !gnucap() {
+        return;
+    }
+    let mut tried = vec![];
+    for model in models() {
+        let translation = translated(&model, &Overrides::default()).translation;
+        let Ok(written) = written(&translation.netlist, "gnucap") else { continue };
+        let what = model.display().to_string();
+        let theirs = run(&written.text, &what);
+        // A row at a jump holds the value after it in ours, the one before its rise in theirs.
+        let header = translation.netlist.header.iter().filter(|(key, _)| key == "jump");
+        let jumps: Vec<f64> = header
+            .flat_map(|(_, words)| words.split(' ').filter_map(|word| word.parse().ok()))
+            .collect();
+        let observe = Some(theirs.names[1..].join(", "));
+        let overrides = Overrides { observe, ..Overrides::default() };
+        let (ours, _) =
+            run_text("deck.cir", &written.text, &overrides).unwrap_or_else(|d| panic!("{d:?}"));
+        let (theirs, ours) = (without(&theirs, &jumps), without(&ours, &jumps));
+        let settings = compare::Settings { tolerance: 1e-3, rise: None, signals: None };
+        let comparison = compare::compare(&theirs, &ours, &settings);
+        for signal in &comparison.signals {
+            println!("{what}: {} {:.1e} at {}", signal.name, signal.max, signal.at);
+        }
+        let worst = comparison.signals.iter().map(|s| s.max).fold(0.0, f64::max);
+        assert!(comparison.missing.is_empty() && worst <= 1e-3, "{what}: {worst:.1e}");
+        tried.push(what);
+    }
+    assert!(tried.len() >= 18, "{tried:?}");
 }

@@ -1,7 +1,7 @@
 //! A netlist in the words that a dialect has.
 
 use super::dialects::{Dialect, NGSPICE, Switches};
-use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Waveform};
+use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
 use crate::source::Span;
@@ -42,6 +42,26 @@ pub const DIODE: Lack = Lack {
     what: "a diode",
     help: "only linear models can be written for it",
 };
+
+/// A sine that starts at an angle.
+pub const PHASE: Lack = Lack {
+    needed: |element, _| {
+        let (Element::VoltageSource(waveform) | Element::CurrentSource(waveform)) = element else {
+            return false;
+        };
+        match waveform {
+            Waveform::Function { shape: Shape::Sin, arguments } => {
+                arguments.get(PLAIN_SINE).is_some_and(|phase| phase.as_number() != Some(0.0))
+            }
+            _ => false,
+        }
+    },
+    what: "a sine with a phase",
+    help: "give the sine a delay instead",
+};
+
+/// Arguments of a sine before its phase.
+const PLAIN_SINE: usize = 5;
 
 /// A line that does not start at rest.
 pub const CHARGED_LINE: Lack = Lack {
@@ -139,6 +159,12 @@ fn scope(
             CardKind::Model { kind, parameters, .. } if dialect.switches == Switches::Smooth => {
                 smooth(kind, parameters);
             }
+            CardKind::Device(Device {
+                element:
+                    Element::VoltageSource(Waveform::Function { shape: Shape::Sin, arguments })
+                    | Element::CurrentSource(Waveform::Function { shape: Shape::Sin, arguments }),
+                ..
+            }) if !dialect.phases => arguments.truncate(PLAIN_SINE),
             _ => {}
         }
     }

@@ -28,6 +28,8 @@ pub struct Dialect {
     /// Whether linked sources and switches may take the current of any device that has one as an unknown (E, H, B),
     /// not of V sources alone.
     pub linked_to_any: bool,
+    /// Whether a sine has a place for a phase.
+    pub phases: bool,
     /// What models of switches are called.
     pub switches: Switches,
     /// What it cannot say.
@@ -64,6 +66,7 @@ pub const NGSPICE: Dialect = Dialect {
     print: ".print tran",
     options: (None, &[]),
     linked_to_any: true,
+    phases: true,
     switches: Switches::Threshold,
     lacks: &[],
     read: read::read,
@@ -103,9 +106,11 @@ pub const DIALECTS: &[Dialect] = &[
         about: "gnucap 0.36: linear models only; those among the shipped ones run in it",
         comments: Comments::Above,
         save: "",
-        options: (None, &["numdgt=9"]),
+        // Its voltage sources have a resistance, by default 10 µΩ: too much beside hundreds of rad/s as amperes.
+        options: (None, &["short=1e-9", "numdgt=9"]),
         linked_to_any: false,
-        lacks: &[adapt::LAW, adapt::SWITCH, adapt::DIODE, adapt::CHARGED_LINE],
+        phases: false,
+        lacks: &[adapt::LAW, adapt::SWITCH, adapt::DIODE, adapt::PHASE, adapt::CHARGED_LINE],
         ..NGSPICE
     },
 ];
