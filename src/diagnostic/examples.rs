@@ -118,6 +118,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0601" "flow_of_a_ring.bg"
     "E0603" "noise_too_long.bg"
     "E0604" "source_short_circuited.bg"
+    "E0605" "law_for_gnucap.bg"
     "W0601" "element_short_circuited.bg"
     "E0701" "unknown_card.cir"
     "E0702" "transistor.cir"

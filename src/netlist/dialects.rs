@@ -106,8 +106,9 @@ pub const DIALECTS: &[Dialect] = &[
         about: "gnucap 0.36: linear models only; those among the shipped ones run in it",
         comments: Comments::Above,
         save: "",
-        // Its voltage sources have a resistance, by default 10 µΩ: too much beside hundreds of rad/s as amperes.
-        options: (None, &["short=1e-9", "numdgt=9"]),
+        // Its voltage sources have a resistance, by default 10 µΩ, too much where amperes are hundreds of rad/s, and its
+        // nodes and charges have floors far above what is usual in hydraulics.
+        options: (None, &["short=1e-9", "gmin=1e-20", "abstol=1e-18", "chgtol=1e-25", "numdgt=9"]),
         linked_to_any: false,
         phases: false,
         lacks: &[adapt::LAW, adapt::SWITCH, adapt::DIODE, adapt::PHASE, adapt::CHARGED_LINE],

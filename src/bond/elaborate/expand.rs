@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
 /// More elements, signals, parameters and instances than this are a slip of the pen.
-pub const MOST_PARTS: usize = 500_000;
+pub const MOST_PARTS: usize = 250_000;
 
 impl<'a> Scope<'a> {
     /// Collects every declaration of a program. `set`: what the command line sets, read.
@@ -483,15 +483,7 @@ impl<'a> Scope<'a> {
         if parts <= MOST_PARTS && self.clock <= 4 * MOST_PARTS {
             return false;
         }
-        if !d.iter().any(|d| d.code == "E0237") {
-            d.push(
-                Diagnostic::error("E0237", span, "the graph is too large")
-                    .says("here it grows beyond the limit")
-                    .because(format!(
-                        "at most {MOST_PARTS} elements, signals, parameters and instances"
-                    )),
-            );
-        }
+        too_large(span, d);
         true
     }
 
@@ -515,6 +507,11 @@ impl<'a> Scope<'a> {
         let (Some(from), Some(to)) = (from, to) else {
             return self.excuse(span);
         };
+        if to.saturating_sub(from) > MOST_PARTS as i64 {
+            // No need to try.
+            too_large(span, d);
+            return self.excuse(span);
+        }
         let before = self.here;
         let name: std::rc::Rc<str> = variable.text.as_str().into();
         for value in from..=to {
@@ -884,4 +881,17 @@ fn stem(map: &SourceMap, file: crate::source::FileId) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
     let stem = last.strip_suffix(".bg").unwrap_or(last);
     stem.trim_matches(['<', '>']).to_string()
+}
+
+/// Says once that there is more than any model needs.
+fn too_large(span: Span, d: &mut Vec<Diagnostic>) {
+    if !d.iter().any(|d| d.code == "E0237") {
+        d.push(
+            Diagnostic::error("E0237", span, "the graph is too large")
+                .says("here it grows beyond the limit")
+                .because(format!(
+                    "at most {MOST_PARTS} elements, signals, parameters and instances"
+                )),
+        );
+    }
 }

@@ -222,7 +222,7 @@ impl<F: Modular> Reading<'_, F> {
             (Function::PowerOfAbs, [x, y]) if even => self.power(x.clone(), y.clone(), second),
             (Function::SignedPower, [x, y]) if odd => self.power(x.clone(), y.clone(), second),
             (Function::PowerOfAbs | Function::SignedPower, _) => self.opaque(&function, arguments),
-            _ => match function.row().ngspice {
+            _ => match function.row().netlist {
                 Spelling::Name(_) => self.opaque(&function, arguments),
                 Spelling::Expansion(template) => {
                     self.form(&template(), &mut |slot, _| match slot {
