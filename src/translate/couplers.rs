@@ -32,10 +32,13 @@ impl Drawing {
         if island.closing.is_empty() {
             return vec![];
         }
-        let mut equal = equal_junctions(graph, island);
+        let equal = equal_junctions(graph, island);
         let mut open: Vec<BondId> = Vec::new();
         for bond in &island.closing {
-            if closes_ring(graph, &mut equal, *bond) {
+            // What runs round a ring of junctions of one kind is left undetermined.
+            let ends = [graph.bond(*bond).from.vertex, graph.bond(*bond).to.vertex];
+            let [a, b] = ends.map(|vertex| equal.get(&vertex));
+            if a == b && of_one_kind(graph, *bond) {
                 self.cut_ring(graph, *bond)
             } else {
                 open.push(*bond)
@@ -106,26 +109,29 @@ impl Drawing {
     }
 }
 
-/// Junctions of one kind that bonds of the spanning tree join.
-fn equal_junctions(graph: &BondGraph, island: &Island) -> Forest {
-    let mut equal = Forest::new(graph.vertices.len());
+/// Junctions of one kind that bonds of the spanning tree join: the set of each.
+fn equal_junctions(graph: &BondGraph, island: &Island) -> HashMap<VertexId, usize> {
+    let mut sets = Forest::new(island.junctions.len());
+    let junctions = island.junctions.iter().enumerate();
+    let mut places: HashMap<VertexId, usize> = junctions.map(|(at, id)| (*id, at)).collect();
     let closing: HashSet<BondId> = island.closing.iter().copied().collect();
     for id in island.bonds.iter().filter(|id| !closing.contains(id)) {
         let ends = [graph.bond(*id).from.vertex, graph.bond(*id).to.vertex];
-        let zero = ends.map(|vertex| matches!(graph.vertex(vertex).law, Law::Zero));
-        if ends.into_iter().all(|vertex| is_junction(graph, vertex)) && zero[0] == zero[1] {
-            equal.join(ends[0].index(), ends[1].index());
+        if let [Some(a), Some(b)] = ends.map(|vertex| places.get(&vertex))
+            && of_one_kind(graph, *id)
+        {
+            sets.join(*a, *b);
         }
     }
-    equal
+    places.values_mut().for_each(|place| *place = sets.root(*place));
+    places
 }
 
-/// Whether a bond closes a ring of junctions of one kind: what runs round it is left undetermined.
-fn closes_ring(graph: &BondGraph, equal: &mut Forest, bond: BondId) -> bool {
-    let bond = graph.bond(bond);
-    let kind = |vertex: VertexId| matches!(graph.vertex(vertex).law, Law::Zero);
-    kind(bond.from.vertex) == kind(bond.to.vertex)
-        && equal.root(bond.from.vertex.index()) == equal.root(bond.to.vertex.index())
+/// Whether a bond between junctions joins two of one kind.
+fn of_one_kind(graph: &BondGraph, bond: BondId) -> bool {
+    let ends = [graph.bond(bond).from.vertex, graph.bond(bond).to.vertex];
+    let [a, b] = ends.map(|vertex| matches!(graph.vertex(vertex).law, Law::Zero));
+    a == b
 }
 
 /// A graph of an island's ports with fewer bonds cut than these, which are known to leave one; as few as are found.

@@ -3,6 +3,7 @@
 use super::forest::Forest;
 use crate::bond::graph::{BondGraph, BondId, End, Law, VertexId};
 use crate::quantity::Domain;
+use std::collections::HashSet;
 
 /// Junctions and bonds that one connected circuit realises.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,19 +96,18 @@ fn closing_bonds(graph: &BondGraph, island: &Island) -> Vec<BondId> {
         // A tree.
         return vec![];
     }
-    let mut reached = vec![false; graph.vertices.len()];
-    let mut in_tree = vec![false; graph.bonds.len()];
+    let mut reached = HashSet::new();
+    let mut in_tree = HashSet::new();
     let mut queue = std::collections::VecDeque::new();
     if let Some(root) = island.junctions.first() {
-        reached[root.index()] = true;
+        reached.insert(*root);
         queue.push_back(*root);
     }
     while let Some(vertex) = queue.pop_front() {
         for bond in &graph.vertex(vertex).bonds {
             let far = other_end(graph, *bond, junction_end(vertex)).vertex;
-            if is_junction(graph, far) && !reached[far.index()] {
-                reached[far.index()] = true;
-                in_tree[bond.index()] = true;
+            if is_junction(graph, far) && reached.insert(far) {
+                in_tree.insert(*bond);
                 queue.push_back(far);
             }
         }
@@ -120,7 +120,7 @@ fn closing_bonds(graph: &BondGraph, island: &Island) -> Vec<BondId> {
             let bond = graph.bond(*id);
             is_junction(graph, bond.from.vertex)
                 && is_junction(graph, bond.to.vertex)
-                && !in_tree[id.index()]
+                && !in_tree.contains(id)
         })
         .collect()
 }

@@ -276,3 +276,58 @@ fn flows_inside_are_measured_without_a_coupler() {
         assert!(translation.figures.helpers <= 2, "{}", text(&translation));
     }
 }
+
+#[test]
+fn flows_and_efforts_inside_are_read_wherever_junctions_are_split() {
+    // Junctions of networks given by their matrices, split in two of one kind with a bond between, whose flow is integrated:
+    // it is a sum that no branch carries, and often one that no wire could carry.
+    let mut dice = Dice(16);
+    let (mut compared, mut measured, mut coupled) = (0, 0, 0);
+    for round in 0..80 {
+        let make = if round % 2 == 0 { two_connected } else { three_connected };
+        let (nodes, edges) = make(6 + round / 8, &mut dice);
+        let matrix = disguised(network(nodes, &edges, &mut dice), 3, &mut dice);
+        let mut b = by_matrix(&matrix, &mut dice);
+        for split in 0..2 {
+            let junctions = b.graph.vertex_ids().filter(|id| is_junction(&b.graph, *id));
+            let wide: Vec<VertexId> =
+                junctions.filter(|id| b.graph.vertex(*id).bonds.len() >= 4).collect();
+            let Some(junction) = wide.get(dice.below(wide.len().max(1))).copied() else { continue };
+            let law = b.graph.vertex(junction).law.clone();
+            let zero = matches!(law, Law::Zero);
+            let other = b.vertex("0", &format!("split{split}"), law);
+            let bonds = b.graph.vertex(junction).bonds.clone();
+            let (stay, go) = bonds.split_at(2 + dice.below(bonds.len() - 3));
+            for bond in go {
+                let bond = &mut b.graph.bonds[bond.index()];
+                for end in [&mut bond.from, &mut bond.to] {
+                    if end.vertex == junction {
+                        end.vertex = other;
+                    }
+                }
+            }
+            b.graph.vertices[junction.index()].bonds = stay.to_vec();
+            b.graph.vertices[other.index()].bonds = go.to_vec();
+            let bond = bond_either_way(&mut b, junction, other, &mut dice);
+            let rate = Expr::leaf(Leaf::Bond { bond, variable: Power::Flow, negated: false });
+            let initial = Initial::Given(n(0.0));
+            // The flow of a 1-junction is that of its elements.
+            if zero {
+                b.signal(&format!("inside{split}"), SignalLaw::Integrator { rate, initial });
+            }
+        }
+        compared += usize::from(compare(&b.graph).is_some());
+        let translation = translated(&b.graph);
+        let netlist = text(&translation);
+        let couplers = netlist.matches("1:1 coupler").count() / 2;
+        let meters = netlist.matches("0 V, carries").count();
+        assert_eq!(translation.figures.helpers, couplers + meters);
+        // Splitting alone changes no graph; a meter in the split may have none.
+        assert!(meters <= 2 && (meters > 0 || couplers == 0), "{netlist}");
+        measured += meters;
+        coupled += couplers;
+    }
+    assert!(compared > 70, "{compared} of 80 were regular");
+    assert!(measured > 5 && coupled > 0, "{measured} meters, {coupled} couplers");
+    println!("{measured} meters, {coupled} couplers");
+}
