@@ -1,12 +1,13 @@
 //! Loops of junctions: networks given by their nodes, by their meshes, and by their matrices come without a helper; where
 //! no graph exists, the couplers are as few as trying all sets of bonds finds.
 
+use super::forced;
 use super::graphic::tests::{Dice, disguised, dual, k5, k33, network, r10};
 use super::graphic::tests::{three_connected, two_connected};
 use super::graphic::{Matrix, realise};
 use super::islands::{Island, find, is_junction};
 use super::space::Space;
-use super::tests::{compare, text, translated};
+use super::tests::{compare, random, text, translated};
 use crate::bond::build::*;
 use crate::bond::graph::*;
 
@@ -330,4 +331,41 @@ fn flows_and_efforts_inside_are_read_wherever_junctions_are_split() {
     assert!(compared > 70, "{compared} of 80 were regular");
     assert!(measured > 5 && coupled > 0, "{measured} meters, {coupled} couplers");
     println!("{measured} meters, {coupled} couplers");
+}
+
+#[test]
+fn rings_and_contradictions_lose_no_device() {
+    // Many loops, most of them singular somewhere: whatever is left undetermined, each element stands in the circuit.
+    let mut seed = 17;
+    let (mut translated, mut refused) = (0, 0);
+    for round in 0..1500 {
+        let graph = random(&mut seed, 1 + round % 10);
+        let mut said = vec![];
+        forced::check(&graph, &mut said);
+        let mut diagnostics = vec![];
+        let translation = super::translate(
+            &graph,
+            &Default::default(),
+            &Default::default(),
+            &Default::default(),
+            &mut diagnostics,
+        );
+        let Some(translation) = translation else {
+            assert!(diagnostics.iter().all(|d| d.code == "E0601"), "{diagnostics:?}");
+            refused += 1;
+            continue;
+        };
+        let ports: usize = graph
+            .vertices
+            .iter()
+            .filter(|vertex| !matches!(vertex.law, Law::Zero | Law::One))
+            .map(|vertex| vertex.bonds.len())
+            .sum();
+        let netlist = text(&translation);
+        let couplers = netlist.matches("1:1 coupler").count() / 2;
+        let figures = translation.figures;
+        assert_eq!(figures.devices, ports + figures.helpers + couplers, "{netlist}");
+        translated += 1;
+    }
+    assert!(translated > 1000 && refused < 400, "{translated} translated, {refused} refused");
 }

@@ -481,7 +481,7 @@ fn a_loop_that_no_wire_closes_gets_a_coupler() {
 }
 
 /// A random tree of junctions with elements and two-ports; `loops` more bonds between junctions.
-fn random(seed: &mut u64, loops: usize) -> BondGraph {
+pub fn random(seed: &mut u64, loops: usize) -> BondGraph {
     let mut next = |below: u64| {
         *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*seed >> 33) % below
