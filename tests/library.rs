@@ -321,6 +321,57 @@ fn a_press_moves_as_its_equations() {
 }
 
 #[test]
+fn a_jack_lifts_as_its_equations() {
+    let (q, r, s, beta, m) = (2e-4, 5e9, 2e-3, 1.2e9, 400.0);
+    // Pressures, speed, stroke.
+    let rate = |t: f64, x: &[f64; 4]| {
+        let [below, above, v, at] = *x;
+        let pumped = if t >= 0.02 { q } else { 0.0 };
+        [
+            beta / (60e-6 + s * at) * (pumped - s * v),
+            beta / (300e-6 - s * at) * (s * v - above / r),
+            (s * (below - above) - 4e3 * v - 60e3 * at - m * 9.81) / m,
+            v,
+        ]
+    };
+    let observed = |_, x: &[f64; 4]| vec![x[0] / 1e5, x[1] / 1e5, x[3] * 1e3, x[2]];
+    let names = ["below", "above", "stroke", "speed"];
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        let trace = shipped("lifting_jack", &options(reltol));
+        let hand = by_hand(&trace, 200, [5e5, 5e5, 0.0, 0.0], &names, rate, observed);
+        agree("lifting_jack", &trace, &hand, tolerance);
+    }
+}
+
+#[test]
+fn a_switched_bridge_reverses_a_motor_as_its_equations() {
+    let (u, fs, on, l, resistance, phi, j, b) = (48.0, 1e3, 0.02, 2e-3, 0.5, 0.06, 2e-4, 1.1e-3);
+    let modulus = |t: f64| {
+        let mean = if t < 0.05 { 0.6 } else { -0.4 };
+        // The edges lie on rows, those of the test's steps 1e-9 of a step beside them.
+        let phase = (t * fs).fract();
+        if phase < (1.0 + mean) / 2.0 { 1.0 } else { -1.0 }
+    };
+    let rate = |t: f64, x: &[f64; 2]| {
+        let [i, w] = *x;
+        [(modulus(t) * u - (on + resistance) * i - phi * w) / l, (phi * i - b * w) / j]
+    };
+    let observed = |t: f64, x: &[f64; 2]| {
+        // The last row is the one before its jump.
+        let d = if t > 0.0999 { -1.0 } else { modulus(t + 1e-9) };
+        vec![x[0], x[1], d * u * x[0], d]
+    };
+    let names = ["current", "speed", "power", "modulus"];
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        let trace = shipped("reversing_drive", &options(reltol));
+        let hand = by_hand(&trace, 20, [0.0, 0.0], &names, rate, observed);
+        agree("reversing_drive", &trace, &hand, tolerance);
+        let regenerated = trace.column("power").unwrap().iter().copied().fold(0.0, f64::min);
+        assert!(regenerated < -100.0, "{regenerated} W");
+    }
+}
+
+#[test]
 fn an_arm_on_a_gear_that_gives() {
     let (n, k, c, weight, l) = (0.02, 2e3, 5.0, 4.0 * 9.81, 0.3);
     let reference = |t: f64| if t >= 0.1 { 60f64.to_radians() } else { 0.0 };

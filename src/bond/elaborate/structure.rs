@@ -322,29 +322,40 @@ impl<'a> Scope<'a> {
         let whole = to.0.span;
         let behind = self.map.text(Span { start: arrow.span.end, end: whole.start, ..whole });
         let span = if behind.contains(',') { whole } else { from.0.span.join(whole) };
-        let index = self.halves.len();
+        // Both ends are looked at before either is joined: a half that is left out joins nothing.
         for (end, tip) in [from, to] {
+            let Some(first) = self.slot(tip).and_then(|slot| *slot) else { continue };
+            let first = self.halves[first].span;
             let Tip::Port(id) = tip else { continue };
-            let inside = self.ports[id.0 as usize].frame == self.here.frame;
-            let port = &mut self.ports[id.0 as usize];
-            let slot = if inside { &mut port.inner } else { &mut port.outer };
-            if let Some(first) = *slot {
-                let side = if inside { "inside" } else { "outside" };
-                let error = Diagnostic::error(
-                    "E0415",
-                    end.path.span,
-                    format!("two bonds join the port `{}` from {side}", port.name),
-                )
-                .says("joined again here")
-                .label(self.halves[first].span, "first joined here")
-                .label(port.span, "the port");
-                d.push(error.help("put a junction at the port, and join both to it"));
-                return false;
+            let port = &self.ports[id.0 as usize];
+            let side = if port.frame == self.here.frame { "inside" } else { "outside" };
+            let error = Diagnostic::error(
+                "E0415",
+                end.path.span,
+                format!("two bonds join the port `{}` from {side}", port.name),
+            )
+            .says("joined again here")
+            .label(first, "first joined here")
+            .label(port.span, "the port");
+            d.push(error.help("put a junction at the port, and join both to it"));
+            return false;
+        }
+        let index = self.halves.len();
+        for (_, tip) in [from, to] {
+            if let Some(slot) = self.slot(tip) {
+                *slot = Some(index);
             }
-            *slot = Some(index);
         }
         self.halves.push(Half { from: from.1, to: to.1, stroke: arrow.stroke, span, bond: None });
         true
+    }
+
+    /// Where a port notes the half that joins it on the side of the frame at hand.
+    fn slot(&mut self, tip: Tip) -> Option<&mut Option<usize>> {
+        let Tip::Port(id) = tip else { return None };
+        let port = &mut self.ports[id.0 as usize];
+        let inside = port.frame == self.here.frame;
+        Some(if inside { &mut port.inner } else { &mut port.outer })
     }
 
     /// The bonds: each from a vertex through any number of ports to a vertex.
