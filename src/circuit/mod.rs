@@ -193,7 +193,13 @@ pub struct Circuit {
     pub options: Vec<(String, String)>,
     /// Output grid (interval), where the header or the command line asks for one.
     pub grid: Option<f64>,
+    /// What the devices, voltages and currents are called in the text that the circuit was made of.
+    pub spoken: Spoken,
 }
+
+/// What a circuit's `E_eta`, `v(mesh)` and `i(v_bus)` (folded to lower case) are called in the bond graph that it was made of:
+/// `R:eta`, `e(mesh)`, `f(bus)`. Empty for a circuit that was written as one.
+pub type Spoken = std::collections::BTreeMap<String, String>;
 
 impl Circuit {
     /// The devices with their indices.

@@ -175,6 +175,7 @@ impl<'a> Stamper<'a> {
             .iter()
             .filter_map(|(node, value)| self.node(*node).map(|unknown| (unknown, *value)))
             .collect();
+        self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps
     }
 

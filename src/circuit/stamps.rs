@@ -167,6 +167,8 @@ pub enum MemoryKind {
 /// All that a circuit comes down to.
 #[derive(Clone, Debug, Default)]
 pub struct Stamps {
+    /// What its parts are called in the text that it was made of.
+    pub spoken: super::Spoken,
     /// Unknowns, and with them the equations.
     pub unknowns: Vec<Unknown>,
     /// Number of node voltages; branch currents follow.

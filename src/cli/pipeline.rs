@@ -186,7 +186,8 @@ fn set_step(graph: &mut BondGraph, d: &mut Vec<Diagnostic>) {
 impl Model {
     /// The flat circuit, and the units of its columns by name.
     pub fn circuit(&self, d: &mut Vec<Diagnostic>) -> Option<(Circuit, Units)> {
-        let circuit = flatten::flatten(&self.translation.netlist, d)?;
+        let mut circuit = flatten::flatten(&self.translation.netlist, d)?;
+        circuit.spoken = self.translation.map.spoken(&self.translation.netlist.names);
         let unit = |item: &Observation| match item.unit.0.as_str() {
             "" => item.si_unit.clone(),
             unit => unit.to_string(),

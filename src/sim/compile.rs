@@ -365,6 +365,7 @@ impl<'a> Builder<'a> {
             nodes: stamps.nodes,
             outputs: columns.iter().map(|(name, _)| name.clone()).collect(),
             devices: stamps.devices.clone(),
+            spoken: stamps.spoken.clone(),
             charge_devices: stamps.charges.iter().map(|charge| charge.device).collect(),
             conductances,
             constants: self.constants,

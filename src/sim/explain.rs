@@ -88,18 +88,27 @@ pub(crate) fn failure(
     let message = format!("{} {when}", moment.text());
     let mut diagnostic = match trouble {
         Trouble::Modes(device) => {
-            let name = system.device_name(*device);
+            let name = system.spoken_device(*device);
             let fights = format!("`{name}` switches to and fro without end {when}");
+            let (because, help) = if system.spoken.is_empty() {
+                (
+                    "no combination of the switches' states agrees with the voltages that it leads to",
+                    "give the switch more hysteresis (`vh`, `ih` of its model) than its own switching moves its control by, or none, so that it may stand between on and off; or a capacitance at the node that controls it",
+                )
+            } else {
+                (
+                    "neither value of its condition agrees with what it leads to",
+                    "give its condition more hysteresis than its own change moves it by, or none, so that the solution may slide along it; or a storage to what it follows",
+                )
+            };
             Diagnostic::error(code, system.device_span(*device), fights)
                 .says("its own state changes what it switches by")
-                .because(
-                    "no combination of the switches' states agrees with the voltages that it leads to",
-                )
-                .help("give the switch more hysteresis (`vh`, `ih` of its model) than its own switching moves its control by, or none, so that it may stand between on and off; or a capacitance at the node that controls it")
+                .because(because)
+                .help(help)
         }
         Trouble::Cut(Cut::NonFinite { device }) => match device {
             Some(device) => {
-                let name = system.device_name(*device);
+                let name = system.spoken_device(*device);
                 let infinite = format!("the law of `{name}` is no finite number {when}");
                 Diagnostic::error(code, system.device_span(*device), infinite)
                     .says("it, or its slope, is infinite or no number")
@@ -162,21 +171,29 @@ pub(crate) fn failure(
 
 /// What an equation says, and where it stands.
 pub(crate) fn equation(system: &System, row: usize) -> (String, Span) {
+    let of_bonds = !system.spoken.is_empty();
     match system.unknowns.get(row) {
         Some(unknown) if row < system.nodes => {
-            (format!("the sum of currents at the node of {}", unknown.name), unknown.span)
+            let name = system.spoken_unknown(row);
+            let sum = match of_bonds {
+                true => format!("the sum of flows where {name} is common"),
+                false => format!("the sum of currents at the node of {name}"),
+            };
+            (sum, unknown.span)
         }
         Some(unknown) => match unknown.device {
-            Some(device) => {
-                (format!("the law of `{}`", system.device_name(device)), system.device_span(device))
-            }
+            Some(device) => (
+                format!("the law of `{}`", system.spoken_device(device)),
+                system.device_span(device),
+            ),
             None => (format!("the equation of {}", unknown.name), unknown.span),
         },
         None => match system.charge_devices.get(row - system.equations()) {
-            Some(device) => (
-                format!("the charge of `{}`", system.device_name(*device)),
-                system.device_span(*device),
-            ),
+            Some(device) => {
+                let charge = if of_bonds { "what is stored in" } else { "the charge of" };
+                let name = system.spoken_device(*device);
+                (format!("{charge} `{name}`"), system.device_span(*device))
+            }
             None => ("an equation".into(), Span::NONE),
         },
     }
@@ -216,38 +233,61 @@ pub(crate) fn undetermined(system: &System, singular: &Singular) -> Vec<Diagnost
 }
 
 fn loop_of_sources(system: &System, branches: &[DeviceId]) -> Diagnostic {
-    let names = listed(branches.iter().map(|device| system.device_name(*device)));
-    let message = match branches {
-        [_] => format!("`{names}` is a voltage source across nothing but itself"),
-        _ => format!("{names} form a loop of voltage sources"),
+    let names = listed(branches.iter().map(|device| system.spoken_device(*device)));
+    let of_bonds = !system.spoken.is_empty();
+    let message = match (of_bonds, branches) {
+        (true, _) => format!("the flow of {names} is not determined"),
+        (false, [_]) => format!("`{names}` is a voltage source across nothing but itself"),
+        (false, _) => format!("{names} form a loop of voltage sources"),
     };
     let mut diagnostic = Diagnostic::error("E0781", Span::NONE, message);
     for device in branches.iter().take(6) {
-        let text =
-            format!("the current through `{}` is not determined", system.device_name(*device));
+        let what = if of_bonds { "flow" } else { "current" };
+        let name = system.spoken_device(*device);
+        let text = format!("the {what} through `{name}` is not determined");
         diagnostic = diagnostic.label(system.device_span(*device), text);
     }
-    diagnostic
-        .because("any current could flow round the loop")
-        .help("put a resistance into the loop, or take one of the sources out")
+    let (because, help) = match of_bonds {
+        true => (
+            "they give one effort between them, and any flow could run round",
+            "put an R at a 1-junction between them, or take one of the sources out",
+        ),
+        false => (
+            "any current could flow round the loop",
+            "put a resistance into the loop, or take one of the sources out",
+        ),
+    };
+    diagnostic.because(because).help(help)
 }
 
 fn floating_nodes(system: &System, nodes: &[usize]) -> Diagnostic {
-    let names = listed(nodes.iter().map(|node| system.unknowns[*node].name.as_str()));
-    let message = match nodes {
-        [] => "the circuit has no single solution".to_string(),
-        [_] => format!("{names} is not determined: the node floats"),
-        _ => format!("{names} are not determined: the nodes float together"),
+    let names = listed(nodes.iter().map(|node| system.spoken_unknown(*node)));
+    let of_bonds = !system.spoken.is_empty();
+    let message = match (nodes, of_bonds) {
+        ([], true) => "the graph has no single solution".to_string(),
+        ([], false) => "the circuit has no single solution".to_string(),
+        ([_], true) => format!("{names} is not determined"),
+        ([_], false) => format!("{names} is not determined: the node floats"),
+        (_, true) => format!("{names} are not determined"),
+        (_, false) => format!("{names} are not determined: the nodes float together"),
     };
     let mut diagnostic = Diagnostic::error("E0780", Span::NONE, message);
     for node in nodes.iter().take(6) {
         let unknown = &system.unknowns[*node];
-        diagnostic =
-            diagnostic.label(unknown.span, format!("{} could have any value", unknown.name));
+        let text = format!("{} could have any value", system.spoken_unknown(*node));
+        diagnostic = diagnostic.label(unknown.span, text);
     }
-    diagnostic
-        .because("only current sources, or nothing at all, join them to the rest of the circuit")
-        .help("join them to ground by a resistor, or name one of them 0")
+    let (because, help) = match of_bonds {
+        true => (
+            "nothing there gives an effort: flows are all that is joined, or laws that take none up",
+            "join an R or a C to it, or give the law there a part that grows with the effort",
+        ),
+        false => (
+            "only current sources, or nothing at all, join them to the rest of the circuit",
+            "join them to ground by a resistor, or name one of them 0",
+        ),
+    };
+    diagnostic.because(because).help(help)
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {

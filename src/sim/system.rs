@@ -189,6 +189,8 @@ pub struct System {
     pub outputs: Vec<String>,
     /// Names and places of the devices.
     pub devices: Vec<DeviceLabel>,
+    /// What its parts are called in the text that it was made of.
+    pub spoken: crate::circuit::Spoken,
     pub(crate) charge_devices: Vec<DeviceId>,
     /// Which input of the programs time is; unknowns stand before it, modes and rates behind it.
     pub(crate) time_input: usize,
@@ -251,6 +253,18 @@ impl System {
     /// A device's name.
     pub fn device_name(&self, id: DeviceId) -> &str {
         self.devices.get(id.0 as usize).map_or("?", |device| device.name.as_str())
+    }
+
+    /// What a device is called in a message: the element that it stands for, else its own name.
+    pub fn spoken_device(&self, id: DeviceId) -> &str {
+        let name = self.device_name(id);
+        self.spoken.get(&name.to_lowercase()).map_or(name, String::as_str)
+    }
+
+    /// What an unknown is called in a message.
+    pub fn spoken_unknown(&self, unknown: usize) -> &str {
+        let name = self.unknowns.get(unknown).map_or("?", |unknown| unknown.name.as_str());
+        self.spoken.get(&name.to_lowercase()).map_or(name, String::as_str)
     }
 
     /// A device's place.

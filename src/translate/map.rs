@@ -10,7 +10,8 @@ use crate::netlist::write::expression;
 use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
 use crate::quantity::Domain;
 use crate::source::FileId;
-use std::collections::HashMap;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 
 /// The map of a translation.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +94,31 @@ pub struct Link {
 }
 
 impl Map {
+    /// What the circuit's devices, voltages and currents are called in the bond graph.
+    pub fn spoken(&self, names: &Names) -> BTreeMap<String, String> {
+        let mut spoken = BTreeMap::new();
+        for card in self.cards.iter().filter(|card| card.line.is_some()) {
+            spoken.insert(card.card.to_lowercase(), card.element.clone());
+        }
+        // Columns may be headed by anything.
+        let plain = |v: &&Variable| !v.observed || v.bg.starts_with("e(") || v.bg.starts_with("f(");
+        for variable in self.variables.iter().filter(plain) {
+            let name = match variable.expr.as_ref().map(|expr| &*expr.node) {
+                Some(Node::Leaf(Leaf::Voltage(node, None))) => format!("v({})", names.text(*node)),
+                Some(Node::Leaf(Leaf::Current(device))) => format!("i({})", names.text(*device)),
+                _ => continue,
+            };
+            // The junction that gave the node its name before the ports at it.
+            let own = variable.bg.get(1..) == name.get(1..);
+            match spoken.entry(name.to_lowercase()) {
+                Entry::Occupied(mut other) if own => drop(other.insert(variable.bg.clone())),
+                Entry::Occupied(_) => {}
+                Entry::Vacant(place) => drop(place.insert(variable.bg.clone())),
+            }
+        }
+        spoken
+    }
+
     /// The map as JSON, schema 1.
     pub fn json(&self, names: &Names) -> serde_json::Value {
         // A result holds no parameters: they stand here as numbers.

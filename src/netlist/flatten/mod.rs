@@ -39,6 +39,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         outputs,
         options,
         grid: header.grid,
+        ..Circuit::default()
     };
     experiment::scales(&mut circuit, &header, diagnostics);
     (!has_errors(&diagnostics[before..])).then_some(circuit)

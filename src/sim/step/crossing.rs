@@ -391,7 +391,7 @@ impl Run<'_> {
         }
         let system = network.system;
         let data = &system.modes[slide.mode];
-        let name = system.device_name(data.device);
+        let name = system.spoken_device(data.device);
         let span = if data.span.is_none() { system.device_span(data.device) } else { data.span };
         let message = format!(
             "the solution slides along a condition of `{name}` from t = {:.6e} s",
