@@ -91,39 +91,6 @@ fn by_hand<const N: usize>(
 }
 
 #[test]
-fn the_actuator_of_two_lines() {
-    const OBSERVED: &str = "x, theta, f(motor.armature) as \"I\", f(motor.rotor) as \"Omega\", \
-        e(pump1) as \"Pp1\", e(pump2) as \"Pp2\", f(pump.out.2) - f(pump.gap) as \"Qp\", f(pump.gap) as \"Qlp\", \
-        f(line1.flow) as \"Ql1\", f(line2.flow) as \"Ql2\", f(valve1.flow) as \"Qaccu1\", \
-        f(valve2.flow) as \"Qaccu2\", f(limiter.flow) as \"Qsat\", e(jack.side1) as \"Pj1\", \
-        e(jack.side2) as \"Pj2\", f(jack.gap) as \"Qlj\", e(jack.chamber1.fluid) as \"Pc1\", \
-        e(jack.chamber2.fluid) as \"Pc2\", e(attachment.force) as \"Fj\", f(jack.moving) as \"Vj\", \
-        f(surface) as \"Omega_FC\", control.alpha as \"alpha\", control.I_ref as \"Iref\", \
-        control.w_ref as \"Omega_ref\", power(bus) as \"Pelec\"";
-    const STEP: [&str; 2] = [
-        "x_ref = step(0.1 s, 0 mm, 20 mm)",
-        "M_FC = pwl(0 s, 0 N*m; 0.5 s, 0 N*m; 0.6 s, -6 kN*m; 1 s, -6 kN*m)",
-    ];
-    const OVERLOAD: [&str; 2] = [
-        "x_ref = 0 m",
-        "M_FC = pwl(0 s, 0 N*m; 0.1 s, 0 N*m; 0.4 s, 16.7 kN*m; 0.6 s, 16.7 kN*m; 0.9 s, 0 N*m)",
-    ];
-    for (name, drives, until) in
-        [("two_line_step", STEP, "1 s"), ("two_line_overload", OVERLOAD, "1.5 s")]
-    {
-        for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
-            let mut overrides = options(reltol);
-            overrides.drive = drives.map(str::to_string).to_vec();
-            overrides.until = Some(until.to_string());
-            overrides.observe = Some(OBSERVED.to_string());
-            let trace = shipped("eha_two_line", &overrides);
-            let reference = common(&trace, reference(&format!("eha/{name}")), 26);
-            agree(name, &trace, &reference, tolerance);
-        }
-    }
-}
-
-#[test]
 fn components_move_as_the_references_of_flat_models() {
     let cases = [("drive_train", "", "dc_motor_load", 12), ("step_down", "duty=0.4", "buck", 9)];
     for (model, set, path, least) in cases {

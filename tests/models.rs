@@ -346,6 +346,7 @@ fn shipped() -> Vec<String> {
 fn every_model_has_a_test() {
     let tests = [
         include_str!("models.rs"),
+        include_str!("actuators.rs"),
         include_str!("library.rs"),
         include_str!("fields.rs"),
         include_str!("event_models.rs"),
