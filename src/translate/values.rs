@@ -202,7 +202,11 @@ impl Builder<'_> {
     pub fn signal(&self, place: Place) -> Option<Expr> {
         match place {
             Place::Node(node) => Some(self.voltage([node, self.ground()])),
-            Place::Source(vertex) => self.port(vertex, 0).map(|nodes| self.voltage(nodes)),
+            // A source of flow carries it, and has no name for its own current.
+            Place::Source(vertex) => match self.graph.vertex(vertex).law {
+                graph::Law::Source { sets: Power::Flow, .. } => None,
+                _ => self.port(vertex, 0).map(|nodes| self.voltage(nodes)),
+            },
         }
     }
 

@@ -14,7 +14,7 @@ use super::draw::{Modular, Of, decimal};
 use super::form::{Form, Reading, Trouble};
 use super::system::System;
 use super::text::{Start, Text, waveform_of};
-use crate::bond::graph::{BondGraph, Law, Memory, ParameterId, Power, SignalId, SignalLaw};
+use crate::bond::graph::{self, BondGraph, Law, Memory, ParameterId, Power, SignalId, SignalLaw};
 use crate::circuit::{DeviceKind, NodeId};
 use crate::expr::Node;
 use crate::netlist::flatten::scope::{self, ScopeId, TOP};
@@ -288,8 +288,7 @@ impl<'t, F: Modular> Wires<'t, F> {
         if text.as_number().is_some() {
             let mutual = coupling * (inductance(a) * inductance(b)).sqrt();
             if let Some(entry) = self.written_entry(mutual) {
-                let value = decimal(entry).ok_or(Trouble::Nonlinear)?;
-                return Ok(Some((a, b, value)));
+                return Ok(Some((a, b, self.bonds.constant(entry)?)));
             }
         }
         let product = self.value_of(a)? * self.value_of(b)?;
@@ -297,13 +296,13 @@ impl<'t, F: Modular> Wires<'t, F> {
         Ok(Some((a, b, value)))
     }
 
-    /// The literal entry of a field's matrix that is this number up to rounding.
-    fn written_entry(&self, value: f64) -> Option<f64> {
-        let near = |entry: f64| (entry - value).abs() <= 4.0 * f64::EPSILON * entry.abs();
+    /// The entry of a field's matrix, made of literals, that is this number up to rounding.
+    fn written_entry(&self, value: f64) -> Option<&'t graph::Expr> {
+        let near = |entry: f64| (entry - value).abs() <= 8.0 * f64::EPSILON * entry.abs();
         self.graph.vertices.iter().find_map(|vertex| match &vertex.law {
             Law::Field(field) => {
-                let entries = field.matrix.iter().flatten().flatten();
-                entries.filter_map(|entry| entry.constant()).find(|entry| near(*entry))
+                let mut entries = field.matrix.iter().flatten().flatten();
+                entries.find(|entry| entry.constant().is_some_and(near))
             }
             _ => None,
         })

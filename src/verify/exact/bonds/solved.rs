@@ -1,0 +1,75 @@
+//! What the bond graph's equations give once they are solved, or do not give.
+
+use super::super::draw::Modular;
+use super::super::form::{Form, Reading, Trouble};
+use super::super::system::Undetermined;
+use super::{Bonds, Place};
+use crate::bond::graph::{BondId, Expr, Storage, VertexId};
+use std::collections::HashMap;
+
+impl<F: Modular> Bonds<'_, F> {
+    /// The values of an expression at a solution.
+    ///
+    /// # Errors
+    /// Why it has none.
+    pub fn value(
+        &self,
+        expr: &Expr,
+        own: Option<VertexId>,
+        solution: &[F],
+        cut: Option<&HashMap<u64, F>>,
+    ) -> Result<F, Trouble> {
+        Reading { draw: self.draw, cut }
+            .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(leaf, own)?.at(solution))))
+    }
+
+    /// Of every law that is cut the value of its text, and what it was cut to.
+    ///
+    /// # Errors
+    /// What has no value in this draw.
+    pub fn cut_values(&self, solution: &[F]) -> Result<HashMap<u64, F>, Trouble> {
+        let mut table = HashMap::new();
+        for (modulus, own, number) in &self.moduli {
+            let value = self.value(modulus, Some(*own), solution, None)?;
+            table.insert(value.value(), *number);
+        }
+        for cut in self.cuts.values() {
+            let value = self.value(&cut.law, cut.own, solution, None)?;
+            table.insert(value.value(), cut.value.at(solution));
+        }
+        Ok(table)
+    }
+
+    /// The names of what is not determined, and of the laws that depend on each other.
+    pub fn explain(&self, found: &Undetermined) -> (Vec<String>, Vec<String>) {
+        let unknowns = found.unknowns.iter().map(|column| self.name(*column)).collect();
+        let mut origins: Vec<String> = vec![];
+        for row in &found.rows {
+            let name = match self.origins.get(*row as usize) {
+                Some(Place::Port(end)) => self.graph.vertex(end.vertex).name.clone(),
+                Some(Place::Signal(id)) => self.graph.signals[id.index()].name.clone(),
+                None => continue,
+            };
+            if !origins.contains(&name) {
+                origins.push(name);
+            }
+        }
+        (unknowns, origins)
+    }
+
+    fn name(&self, column: u32) -> String {
+        let bond = BondId(column / 2);
+        if bond.index() < self.graph.bonds.len() {
+            let letter = if column.is_multiple_of(2) { 'e' } else { 'f' };
+            return format!("{letter}({})", self.graph.bond_name(bond));
+        }
+        if let Some(k) = self.signals.iter().position(|signal| *signal == column) {
+            return self.graph.signals[k].name.clone();
+        }
+        let stored = self.stored.iter().find(|(_, own)| **own == column);
+        stored.map_or_else(String::new, |(end, _)| {
+            let inertia = self.graph.storage(*end) == Some(Storage::Inertia);
+            format!("{}({})", if inertia { 'p' } else { 'q' }, self.graph.port_name(*end))
+        })
+    }
+}
