@@ -73,8 +73,8 @@ fn count(name: &str, otherwise: u64) -> u64 {
 }
 
 #[test]
-fn two_thousand_random_graphs_are_proven_or_told_by_name() {
-    let (first, count) = (count("BONDSPICE_SEED", 1), count("BONDSPICE_GRAPHS", 2000));
+fn random_graphs_are_proven_or_told_by_name() {
+    let (first, count) = (count("BONDSPICE_SEED", 1), count("BONDSPICE_GRAPHS", 300));
     let start = Instant::now();
     let (mut proven, mut told, mut wrong) = (0u64, BTreeMap::<String, u64>::new(), vec![]);
     for seed in first..first + count {

@@ -116,7 +116,7 @@ fn parameters<F: Modular>(
 /// Every variable of the map, observed ones apart.
 fn variables<F: Modular>(
     sides: &Sides<F>,
-    cut: &HashMap<u64, F>,
+    cut: &[HashMap<u64, F>],
     drawn: &mut Drawn,
 ) -> Result<(), Nothing> {
     let values = values(sides.bonds, sides.theirs);
@@ -143,9 +143,9 @@ fn equals<F: Modular>(
     sides: &Sides<F>,
     expr: &Expr,
     value: F,
-    cut: &HashMap<u64, F>,
+    cut: &[HashMap<u64, F>],
 ) -> Result<bool, Nothing> {
-    for cut in [None, Some(cut)] {
+    for cut in std::iter::once(None).chain(cut.iter().map(Some)) {
         match sides.wires.value(TOP, expr, sides.ours, cut) {
             Ok(found) if found == value => return Ok(true),
             Ok(_) => {}
@@ -217,7 +217,7 @@ fn values<F: Modular>(bonds: &Bonds<F>, solution: &[F]) -> HashMap<String, F> {
 /// The columns that the text's header asks for.
 fn columns<F: Modular>(
     sides: &Sides<F>,
-    cut: &HashMap<u64, F>,
+    cut: &[HashMap<u64, F>],
     drawn: &mut Drawn,
 ) -> Result<(), Nothing> {
     let (bonds, text) = (sides.bonds, sides.wires.text);
@@ -280,7 +280,7 @@ fn columns<F: Modular>(
 /// The text of every card that was cut is the law, of the law's own arguments.
 fn laws<F: Modular>(
     sides: &Sides<F>,
-    cut_values: &HashMap<u64, F>,
+    cut_values: &[HashMap<u64, F>],
     drawn: &mut Drawn,
 ) -> Result<(), Nothing> {
     let (bonds, wires) = (sides.bonds, sides.wires);
@@ -299,9 +299,11 @@ fn laws<F: Modular>(
             continue;
         }
         let own = wires.own_value(card.device, sides.ours);
-        if wires.value(pending.scope, law, sides.ours, Some(cut_values))? == own
-            || sides.same(&cut.law, cut.own, card.turned, pending.scope, law)
-        {
+        let mut replaced = false;
+        for cut in cut_values {
+            replaced |= wires.value(pending.scope, law, sides.ours, Some(cut))? == own;
+        }
+        if replaced || sides.same(&cut.law, cut.own, card.turned, pending.scope, law) {
             continue;
         }
         let why = "its text is not the law, or not of the law's own arguments";

@@ -23,21 +23,32 @@ impl<F: Modular> Bonds<'_, F> {
             .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(leaf, own)?.at(solution))))
     }
 
-    /// Of every law that is cut the value of its text, and what it was cut to.
+    /// Of every law that is cut the value of its text, and what it was cut to. Laws of one text are cut to different
+    /// values: each has its own table.
     ///
     /// # Errors
     /// What has no value in this draw.
-    pub fn cut_values(&self, solution: &[F]) -> Result<HashMap<u64, F>, Trouble> {
-        let mut table = HashMap::new();
+    pub fn cut_values(&self, solution: &[F]) -> Result<Vec<HashMap<u64, F>>, Trouble> {
+        let mut pairs = vec![];
         for (modulus, own, number) in &self.moduli {
-            let value = self.value(modulus, Some(*own), solution, None)?;
-            table.insert(value.value(), *number);
+            pairs.push((self.value(modulus, Some(*own), solution, None)?, *number));
         }
         for cut in self.cuts.values() {
             let value = self.value(&cut.law, cut.own, solution, None)?;
-            table.insert(value.value(), cut.value.at(solution));
+            pairs.push((value, cut.value.at(solution)));
         }
-        Ok(table)
+        pairs.sort_by_key(|(value, to)| (value.value(), to.value()));
+        let mut tables: Vec<HashMap<u64, F>> = vec![];
+        for (value, to) in pairs {
+            let key = value.value();
+            match tables.iter_mut().find(|table| table.get(&key).is_none_or(|known| *known == to)) {
+                Some(table) => {
+                    table.insert(key, to);
+                }
+                None => tables.push(HashMap::from([(key, to)])),
+            }
+        }
+        Ok(tables)
     }
 
     /// The names of what is not determined, and of the laws that depend on each other.
