@@ -15,22 +15,48 @@ pub fn did_you_mean(error: Diagnostic, span: Span, written: &str, meant: &str) -
 /// The candidate nearest to `name` by edit distance, when it is near enough to be a likely slip; letters that differ
 /// only in case, and two neighbours swapped, count less. The first of several equally near ones.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let letters: Vec<char> = name.chars().take(64).collect();
-    let limit = 2 * letters.len().div_ceil(3).clamp(1, 3);
-    candidates
-        .into_iter()
-        .filter(|candidate| *candidate != name)
-        .map(|candidate| (distance(&letters, candidate), candidate))
-        .filter(|(distance, candidate)| {
-            // A letter has every other letter near it: there only a slip of case counts; of two letters the first
-            // must be right.
-            let longest = candidate.chars().count().max(letters.len());
-            let begins = candidate.chars().next() == letters.first().copied();
-            *distance <= limit
-                && (*distance == 1 || longest > 2 || (longest == 2 && letters.len() == 2 && begins))
-        })
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
+    let letters: Vec<char> = name.chars().take(LONGEST).collect();
+    let held = letters_held(name);
+    let mut limit = 2 * letters.len().div_ceil(3).clamp(1, 3);
+    let mut best = None;
+    for candidate in candidates {
+        // No edit costs less than the letters that it brings in and takes away: most names need no closer look.
+        if (held ^ letters_held(candidate)).count_ones() as usize > limit || candidate == name {
+            continue;
+        }
+        let Some(distance) = distance(&letters, candidate, limit) else { continue };
+        // A letter has every other letter near it: there only a slip of case counts; of two letters the first must be
+        // right.
+        let longest = candidate.chars().count().max(letters.len());
+        let begins = candidate.chars().next() == letters.first().copied();
+        if distance == 1 || longest > 2 || (longest == 2 && letters.len() == 2 && begins) {
+            best = Some(candidate);
+            match distance {
+                0 | 1 => break,
+                _ => limit = distance - 1,
+            }
+        }
+    }
+    best
+}
+
+/// Letters of a name that are looked at.
+const LONGEST: usize = 64;
+
+/// Which letters and figures a name holds, without regard to case, one bit each; others share bits.
+fn letters_held(name: &str) -> u64 {
+    name.chars().take(LONGEST).fold(0, |held, letter| {
+        let bit = match letter {
+            'a'..='z' => letter as u32 - 'a' as u32,
+            'A'..='Z' => letter as u32 - 'A' as u32,
+            '0'..='9' => 26 + (letter as u32 - '0' as u32),
+            '_' => 36,
+            '.' => 37,
+            // Beyond ASCII case is not looked at, since a letter may change its number of them.
+            _ => return held,
+        };
+        held | 1 << bit
+    })
 }
 
 /// Whether a name is surely a slip of the pen for another: letters of the wrong case, two neighbours swapped, or one
@@ -50,14 +76,23 @@ pub fn is_slip(name: &str, meant: &str) -> bool {
     short.len() >= 3 && extra && short.get(same..) == long.get(same + 1..)
 }
 
-/// Twice the edit distance (optimal string alignment), a change of case counting one half.
-fn distance(a: &[char], b: &str) -> usize {
-    let b: Vec<char> = b.chars().take(64).collect();
-    let mut before = vec![0; b.len() + 1];
-    let mut last: Vec<usize> = (0..=b.len()).map(|j| 2 * j).collect();
+/// Twice the edit distance (optimal string alignment), a change of case counting one half; `None` above a limit.
+fn distance(a: &[char], b: &str, limit: usize) -> Option<usize> {
+    let mut letters = ['\0'; LONGEST];
+    let mut count = 0;
+    for (place, letter) in letters.iter_mut().zip(b.chars()) {
+        *place = letter;
+        count += 1;
+    }
+    let b = &letters[..count];
+    if 2 * a.len().abs_diff(count) > limit {
+        return None;
+    }
+    let mut before = [0usize; LONGEST + 1];
+    let mut last: [usize; LONGEST + 1] = std::array::from_fn(|j| 2 * j);
     for i in 1..=a.len() {
-        let mut row = vec![2 * i; b.len() + 1];
-        for j in 1..=b.len() {
+        let mut row = [2 * i; LONGEST + 1];
+        for j in 1..=count {
             let change = if a[i - 1] == b[j - 1] {
                 0
             } else if a[i - 1].to_lowercase().eq(b[j - 1].to_lowercase()) {
@@ -72,7 +107,7 @@ fn distance(a: &[char], b: &str) -> usize {
         }
         before = std::mem::replace(&mut last, row);
     }
-    last[b.len()]
+    Some(last[count]).filter(|distance| *distance <= limit)
 }
 
 #[cfg(test)]

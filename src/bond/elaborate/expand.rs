@@ -123,6 +123,7 @@ impl<'a> Scope<'a> {
             clock: 0,
             parameter_dimensions: vec![],
             signal_dimensions: vec![],
+            searched: Default::default(),
             units: Default::default(),
         };
         scope.collect_bodies(program, d);

@@ -215,6 +215,10 @@ impl Scope<'_> {
                     format!("the {} `{name}` has no value", declaration.element.noun),
                 )
                 .says(format!("no argument, and no parameter or signal is called `{name}`"));
+                if self.searched(declaration.span) {
+                    d.push(error);
+                    return None;
+                }
                 let mut names: Vec<&str> =
                     self.frame().values.keys().map(|name| name.as_ref()).collect();
                 names.sort_unstable();

@@ -11,8 +11,8 @@ use crate::diagnostic::Diagnostic;
 use crate::expr::Table;
 use crate::quantity::{Dimension, did_you_mean, nearest};
 use crate::source::{FileId, SourceMap, Span};
-use std::cell::OnceCell;
-use std::collections::HashMap;
+use std::cell::{OnceCell, RefCell};
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 pub(super) use super::frames::Meaning;
@@ -91,6 +91,8 @@ pub(super) struct Scope<'a> {
     pub parameter_dimensions: Vec<super::dimensions::Dim>,
     /// The dimension of each signal, as far as known.
     pub signal_dimensions: Vec<super::dimensions::Dim>,
+    /// Places whose unknown name has been searched for a name that was meant.
+    pub searched: RefCell<HashSet<Span>>,
     /// What else is known of units.
     pub units: super::inference::Units<'a>,
 }
@@ -129,6 +131,12 @@ impl<'a> Scope<'a> {
         }
     }
 
+    /// Whether what may be meant at a place has been searched for, which takes a look at every name. In further rounds and
+    /// instances it needs no second search: of one place the same is said once (`merge_repeats`).
+    pub fn searched(&self, span: Span) -> bool {
+        !self.searched.borrow_mut().insert(span)
+    }
+
     /// The error for an element that is not declared in a frame; it tells the nearest.
     pub fn unknown_thing(&self, frame: FrameId, part: &Part, key: &str) -> Diagnostic {
         let names = &self.frames[frame.0 as usize];
@@ -148,6 +156,9 @@ impl<'a> Scope<'a> {
             true => error,
             false => error.label(body.span, format!("the model `{}`", body.name)),
         };
+        if self.searched(part.span) {
+            return error;
+        }
         // Names in statements that could not be read may be meant too; sorted, so that a tie has one winner.
         let known: std::collections::BTreeSet<&str> = names
             .things

@@ -219,6 +219,9 @@ impl Scope<'_> {
                 let error =
                     Diagnostic::error("E0224", name.span, format!("no signal is called `{text}`"))
                         .says("not declared anywhere");
+                if self.searched(name.span) {
+                    return d.push(error);
+                }
                 d.push(match nearest(text, self.signals_here(|_| true)) {
                     Some(meant) => did_you_mean(error, name.span, text, meant),
                     None => error.help(format!("declare it: `signal {text} = …`")),

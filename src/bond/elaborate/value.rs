@@ -350,6 +350,9 @@ impl Scope<'_> {
             }
             None => {}
         }
+        if self.searched(span) {
+            return error;
+        }
         let known = names
             .values
             .iter()
