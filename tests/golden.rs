@@ -18,6 +18,10 @@ const FOR_THE_EYE: [&str; 6] = [
     "sampled_controller.bg",
 ];
 
+/// The same in Saber's language, which has no word for whole parts: those that it can say.
+const IN_SABER: [&str; 5] =
+    ["eha_one_line.bg", "dc_motor_load.bg", "step_down.bg", "coupled_coils.bg", "msd.bg"];
+
 #[test]
 fn netlists_are_what_translation_makes_of_the_models() {
     let update = std::env::var_os("UPDATE").is_some_and(|value| value == "1");
@@ -28,10 +32,12 @@ fn netlists_are_what_translation_makes_of_the_models() {
     let others = ["xyce", "ltspice"]
         .into_iter()
         .flat_map(|dialect| FOR_THE_EYE.iter().map(move |model| (PathBuf::from(model), dialect)));
-    for (model, dialect) in all.chain(others) {
+    let saber = IN_SABER.iter().map(|model| (PathBuf::from(model), "saber"));
+    for (model, dialect) in all.chain(others).chain(saber) {
         let folder = root().join("netlists");
         let folder = if dialect == "ngspice" { folder } else { folder.join(dialect) };
-        let golden = folder.join(&model).with_extension("cir");
+        let ending = if dialect == "saber" { "sin" } else { "cir" };
+        let golden = folder.join(&model).with_extension(ending);
         let netlist = translated(&model, &Overrides::default()).translation.netlist;
         let text = dialects::find(dialect).unwrap().write(&netlist, &mut vec![]).unwrap().text;
         kept.insert(golden.clone());
@@ -57,10 +63,12 @@ fn netlists_are_what_translation_makes_of_the_models() {
         "{}\nUPDATE=1 cargo test --test golden writes the netlists anew: look at the difference first",
         different.join("\n")
     );
-    for folder in ["netlists", "netlists/textbook", "netlists/xyce", "netlists/ltspice"] {
+    for folder in ["", "/textbook", "/xyce", "/ltspice", "/saber"] {
+        let folder = format!("netlists{folder}");
         for entry in std::fs::read_dir(root().join(folder)).unwrap() {
             let path = entry.unwrap().path();
-            let stale = path.extension().is_some_and(|e| e == "cir") && !kept.contains(&path);
+            let stale =
+                path.extension().is_some_and(|e| e == "cir" || e == "sin") && !kept.contains(&path);
             assert!(!stale, "{} belongs to no model", path.display());
         }
     }

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Where to write the netlist
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
-    /// The simulator that shall read it: ngspice, xyce, ltspice, gnucap
+    /// The simulator that shall read it: ngspice, xyce, ltspice, gnucap, saber
     #[arg(long, value_name = "SIMULATOR", default_value = "ngspice")]
     to: String,
     /// Where to write the map: which circuit variable is which effort or flow

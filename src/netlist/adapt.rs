@@ -110,14 +110,7 @@ pub fn adapt(netlist: &Netlist, dialect: &Dialect, d: &mut Vec<Diagnostic>) -> O
     each(&netlist.cards, &mut |card| {
         let CardKind::Device(device) = &card.kind else { return };
         for lack in dialect.lacks.iter().filter(|lack| (lack.needed)(&device.element, &models)) {
-            let name = netlist.names.text(device.name);
-            let message = format!("{} cannot say {}: `{name}`", dialect.name, lack.what);
-            let error = Diagnostic::error("E0605", card.span, message).help(lack.help);
-            // What stands for the element, when the netlist is that of a bond graph.
-            d.push(match &card.comment {
-                Some(comment) => error.because(format!("it stands for {comment}")),
-                None => error,
-            });
+            d.push(cannot_say(dialect, lack, card, netlist.names.text(device.name)));
         }
     });
     if d.len() > before {
@@ -132,6 +125,17 @@ pub fn adapt(netlist: &Netlist, dialect: &Dialect, d: &mut Vec<Diagnostic>) -> O
     scope(&mut cards, &mut netlist.names, dialect, &mut senses);
     netlist.cards = cards;
     Some(Adapted { netlist, senses })
+}
+
+/// The error that a dialect lacks what a card of this name needs.
+pub fn cannot_say(dialect: &Dialect, lack: &Lack, card: &Card, name: &str) -> Diagnostic {
+    let message = format!("{} cannot say {}: `{name}`", dialect.name, lack.what);
+    let error = Diagnostic::error("E0605", card.span, message).help(lack.help);
+    // What stands for the element, when the netlist is that of a bond graph.
+    match &card.comment {
+        Some(comment) => error.because(format!("it stands for {comment}")),
+        None => error,
+    }
 }
 
 /// Every card, those of subcircuits too.

@@ -7,6 +7,7 @@ pub mod write;
 pub mod flatten;
 pub mod dialects;
 pub mod adapt;
+pub mod mast;
 
 use crate::expr;
 use crate::source::Span;
