@@ -283,6 +283,31 @@ fn a_time_beyond_the_run_is_refused() {
 }
 
 #[test]
+fn a_scale_is_a_factor_of_a_domain() {
+    let folder = models();
+    for (scale, words) in [
+        ("hydraulics=1e6", "did you mean `hydraulic`?"),
+        ("electrical=0", "no number above 0"),
+        ("electrical=-3", "no number above 0"),
+        ("electrical=inf", "no number above 0"),
+        ("1e6", "takes auto or DOMAIN=FACTOR"),
+    ] {
+        let output = bondspice(folder.path(), &["convert", "rlc.bg", "--scale", scale]);
+        assert_eq!((code(&output), stdout(&output)), (2, String::new()), "{scale}");
+        assert!(stderr(&output).contains("E0940"), "{}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    }
+    let arguments = ["convert", "rlc.bg", "--scale", "electrical=20", "-o", "scaled.cir"];
+    assert_eq!(code(&bondspice(folder.path(), &arguments)), 0);
+    let [scaled, plain] = ["scaled.cir", "rlc.bg"]
+        .map(|file| rows(&stdout(&bondspice(folder.path(), &["simulate", file]))));
+    assert_eq!(scaled.len(), plain.len());
+    for (a, b) in scaled.iter().flatten().zip(plain.iter().flatten()) {
+        assert!((a - b).abs() <= 1e-4 * (1.0 + b.abs()), "{a}, not {b}");
+    }
+}
+
+#[test]
 fn two_outputs_need_two_places() {
     let folder = models();
     for arguments in [

@@ -1,6 +1,7 @@
 //! Emitted netlists, unedited, in stock ngspice against reference trajectories, and against the second route where
 //! there are none.
 
+mod references;
 mod translated;
 
 use bondspice::bond::elaborate::Overrides;
@@ -26,10 +27,15 @@ fn ngspice() -> bool {
 
 /// The observed columns as ngspice computes them, by the map.
 fn run(model: &Translated) -> Trace {
+    run_as(model, &model.text())
+}
+
+/// The same of a text that differs from the model's own in how it is to be run.
+fn run_as(model: &Translated, text: &str) -> Trace {
     let folder = tempfile::tempdir().unwrap();
     let deck = folder.path().join("deck.cir");
     let raw = folder.path().join("deck.raw");
-    std::fs::write(&deck, model.text()).unwrap();
+    std::fs::write(&deck, text).unwrap();
     let output = Command::new("ngspice").arg("-b").arg("-r").arg(&raw).arg(&deck).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout).to_string()
         + &String::from_utf8_lossy(&output.stderr);
@@ -139,6 +145,61 @@ fn the_actuator_on_a_step() {
         let reference = reference("eha/one_line_step.csv");
         check("step", &run(&model), &reference, &pairs, 1e-6, 1e-3);
     }
+}
+
+/// Rows of 0.25 ms, of which ngspice's steps are a tenth: the check valves settle in some 25 us.
+#[test]
+fn the_actuator_of_two_lines_on_a_step_and_overloaded() {
+    if !ngspice() {
+        return;
+    }
+    for (name, run_of) in references::TWO_LINES {
+        let mut overrides = run_of.overrides(None);
+        overrides.step = Some("0.25 ms".into());
+        let model = translated(Path::new("eha_two_line.bg"), &overrides);
+        let reference = reference(&format!("eha/{name}.csv"));
+        let observed = model.graph.experiment.observe.iter().map(|item| item.name.clone());
+        let names: Vec<String> = observed.filter(|name| reference.column(name).is_some()).collect();
+        assert!(names.len() >= 25, "{names:?}");
+        let pairs: Vec<_> = names.iter().map(|name| (name.as_str(), name.as_str())).collect();
+        check(name, &run(&model), &reference, &pairs, 2.5e-7, 1e-3);
+    }
+}
+
+/// Without a line of options, scaled and as it stands: 1e-3 of range. Then without the step limit too, where the
+/// simulator's own tolerances choose the steps: scaling may not make it worse.
+#[test]
+fn the_scaled_actuator_with_default_tolerances() {
+    if !ngspice() {
+        return;
+    }
+    let reference = reference("eha/one_line_nominal.csv");
+    let pairs = COLUMNS.map(|name| (name, name));
+    let mut worst = vec![];
+    for scales in ["auto", "hydraulic=1"] {
+        let scale = bondspice::bond::scale::parse(scales).unwrap();
+        let overrides = Overrides { observe: Some(ACTUATOR.into()), scale, ..Overrides::default() };
+        let model = translated(Path::new("eha_one_line.bg"), &overrides);
+        let lines: Vec<String> = model
+            .text()
+            .lines()
+            .filter(|line| !line.to_lowercase().starts_with(".options"))
+            .map(str::to_string)
+            .collect();
+        assert_eq!(lines.len() + 1, model.text().lines().count());
+        check(scales, &run_as(&model, &(lines.join("\n") + "\n")), &reference, &pairs, 1e-6, 1e-3);
+        let free: Vec<&str> = lines
+            .iter()
+            .map(|line| if line.starts_with(".tran") { ".tran 1m 3.8 uic" } else { line.as_str() })
+            .collect();
+        let trace = run_as(&model, &(free.join("\n") + "\n"));
+        let signals = pairs.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+        let settings = compare::Settings { tolerance: 1.0, rise: None, signals: Some(signals) };
+        let comparison = compare::compare(&trace, &reference, &settings);
+        worst.push(comparison.signals.iter().map(|signal| signal.max).fold(0.0, f64::max));
+    }
+    println!("no step limit: off by {:.2e} scaled, by {:.2e} as it stands", worst[0], worst[1]);
+    assert!(worst[0] <= 1.1 * worst[1] && worst[0] < 1e-2, "{worst:?}");
 }
 
 /// Models whose laws jump.

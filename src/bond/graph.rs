@@ -408,6 +408,8 @@ pub struct BondGraph {
     pub regulators: Vec<Regulator>,
     /// What a plain run does.
     pub experiment: Experiment,
+    /// The domains whose efforts and flows stand scaled.
+    pub scales: Vec<super::scale::Scale>,
 }
 
 /// A signal that regulates, and what for: nothing that a simulation needs, but what the design of its gains starts
@@ -443,6 +445,13 @@ impl BondGraph {
     pub fn instance_of(&self, id: VertexId) -> Option<(&str, Span)> {
         let (instance, _) = self.vertex(id).name.split_once('.')?;
         self.instances.get(instance).map(|span| (instance, *span))
+    }
+
+    /// What a variable of a domain is to be multiplied by for SI: e and p carry the domain's factor with the power 1, f
+    /// and q with −1.
+    pub fn unscale(&self, domain: Domain, power: i32) -> f64 {
+        let scale = self.scales.iter().find(|scale| scale.domain == domain);
+        scale.map_or(1.0, |scale| scale.factor.powi(power))
     }
 
     /// All vertex indices.

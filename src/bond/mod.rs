@@ -14,5 +14,6 @@ pub mod consistent;
 pub mod fields;
 pub mod prepared;
 pub mod initial;
+pub mod scale;
 #[cfg(test)]
 pub(crate) mod build;

@@ -5,6 +5,7 @@ use super::flags::ModelFlags;
 use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session, same_file};
+use crate::bond::scale;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects::{self, DIALECTS};
 use crate::quantity::nearest;
@@ -32,6 +33,10 @@ pub struct Arguments {
     /// The simulator that shall read it: ngspice, xyce, ltspice, gnucap, saber
     #[arg(long, value_name = "SIMULATOR", default_value = "ngspice")]
     to: String,
+    /// Scale domains, powers unchanged, for simulators with absolute tolerances: auto or DOMAIN=FACTOR,… (efforts are
+    /// divided by the factor, flows multiplied)
+    #[arg(long, value_name = "SCALES")]
+    scale: Option<String>,
     /// Where to write the map: which circuit variable is which effort or flow
     #[arg(long, value_name = "FILE")]
     map: Option<String>,
@@ -57,7 +62,10 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         let error = Diagnostic::error("E0940", Span::NONE, message);
         return Err(session.fail(error.help("give -o and --map two names")));
     }
-    let overrides = arguments.model.overrides(session)?;
+    let mut overrides = arguments.model.overrides(session)?;
+    if let Some(scales) = &arguments.scale {
+        overrides.scale = scale::parse(scales).map_err(|error| session.fail(*error))?;
+    }
     let file = session.load(&arguments.file)?;
     if let Some(stage) = arguments.emit {
         let text = pipeline::emit(session, file, &overrides, stage)?;

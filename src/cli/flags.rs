@@ -61,6 +61,7 @@ impl ModelFlags {
             step: self.step.clone(),
             options: pairs("--option", &self.option, session)?,
             folders: self.include.clone(),
+            scale: vec![],
         })
     }
 }

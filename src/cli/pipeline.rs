@@ -6,6 +6,7 @@ use crate::bond::causality::{self, Causality};
 use crate::bond::elaborate::{self, Overrides};
 use crate::bond::graph::{BondGraph, Observation};
 use crate::bond::initial::{self, InitialState};
+use crate::bond::scale;
 use crate::bond::syntax;
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{Analysis, Circuit};
@@ -77,7 +78,9 @@ pub fn graph(
     if let Some(syntax) = program.files.first() {
         check_options(syntax, overrides, d);
     }
-    elaborate::elaborate(&program, map, overrides, d)
+    let mut graph = elaborate::elaborate(&program, map, overrides, d)?;
+    scale::scale(&mut graph, &overrides.scale);
+    Some(graph)
 }
 
 /// Checks the options of a file and of the command line, each at its place.

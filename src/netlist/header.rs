@@ -13,7 +13,8 @@
 //! | `jump` | `V_x rise fall` | the same of the edges of a PULSE |
 //! | `jump` | `V_x steps` | every second segment of the PWL, from its second on, is one |
 //! | `sample` | `S_x C_x V_x 0.01 0` | S_x is no switch but holds the voltage at its second node, as it is at 0, 0.01 …, at its first one; its capacitor and its clock mean nothing; it comes in round 0 of those that do so at one instant |
-//! | `domain` | `hydraulic 1e6 1e-5 v(a) i(V_b)` | domain, usual magnitudes of its effort and flow in SI, variables |
+//! | `scale` | `hydraulic 1e6` | the domain's efforts stand divided by the factor, its flows multiplied |
+//! | `domain` | `hydraulic 1e6 1e-5 v(a) i(V_b)` | domain, usual magnitudes of its effort and flow as they stand here, variables |
 //! | `column` | `["pump pressure","bar","v(a)/100000"]` | an output column: header, unit, value, as JSON |
 //!
 //! Keys other than `dialect`, `hmax` and `grid` repeat. Unknown keys are skipped: a newer version may have written them.
@@ -36,6 +37,8 @@ pub struct Header {
     pub jumps: Vec<Jumps>,
     /// Switches that stand for exact samples.
     pub samples: Vec<Sample>,
+    /// Domains that are scaled, and by what; columns are not.
+    pub scales: Vec<(String, f64)>,
     /// Domains with their variables.
     pub domains: Vec<DomainVariables>,
     /// Output columns in order; empty when nothing was observed.
@@ -77,9 +80,9 @@ pub struct Sample {
 pub struct DomainVariables {
     /// Its name, `hydraulic`.
     pub domain: String,
-    /// A usual magnitude of its effort (of each node voltage), in SI.
+    /// A usual magnitude of its effort: of each node voltage.
     pub effort: f64,
-    /// A usual magnitude of its flow (of each current), in SI.
+    /// A usual magnitude of its flow: of each current.
     pub flow: f64,
     /// Nodes, as they are named in the netlist.
     pub nodes: Vec<String>,
@@ -123,6 +126,9 @@ impl Header {
         for sample in &self.samples {
             let Sample { switch, capacitor, clock, period, round } = sample;
             push("sample", format!("{switch} {capacitor} {clock} {} {round}", number(*period)));
+        }
+        for (domain, factor) in &self.scales {
+            push("scale", format!("{domain} {}", number(*factor)));
         }
         for domain in &self.domains {
             let begin =
@@ -192,6 +198,10 @@ impl Header {
                     round: next()?.parse().ok()?,
                 });
             }
+            "scale" => {
+                let (domain, factor) = value.trim().split_once(' ')?;
+                self.scales.push((domain.to_string(), factor.trim().parse().ok()?));
+            }
             "domain" => {
                 let mut words = value.split_whitespace();
                 let mut domain = DomainVariables {
@@ -251,6 +261,7 @@ mod tests {
                 period: 0.01,
                 round: 1,
             }],
+            scales: vec![("hydraulic".into(), 1e6)],
             domains: vec![DomainVariables {
                 domain: "hydraulic".into(),
                 effort: 1e6,

@@ -127,6 +127,12 @@ impl Builder<'_> {
             options,
             jumps: std::mem::take(&mut self.jumps),
             samples: std::mem::take(&mut self.samples),
+            scales: self
+                .graph
+                .scales
+                .iter()
+                .map(|scale| (scale.domain.name().to_string(), scale.factor))
+                .collect(),
             domains: self.domain_variables(),
             columns,
         }
@@ -213,8 +219,8 @@ impl Builder<'_> {
             .filter(|row| row.domain != Domain::Any)
             .map(|row| DomainVariables {
                 domain: row.name.to_string(),
-                effort: row.nominal_effort,
-                flow: row.nominal_flow,
+                effort: row.nominal_effort / self.graph.unscale(row.domain, 1),
+                flow: row.nominal_flow / self.graph.unscale(row.domain, -1),
                 nodes: nodes.iter().filter(|(d, _)| *d == row.domain).map(|x| text(x.1)).collect(),
                 devices: devices
                     .iter()

@@ -26,6 +26,8 @@ pub struct Map {
     pub parameters: Vec<(Name, f64)>,
     /// Names that SPICE would not take, or not tell apart.
     pub renamed: Vec<Renamed>,
+    /// Domains that stand scaled in the circuit, and by what.
+    pub scales: Vec<(Domain, f64)>,
     /// How much circuit it took.
     pub figures: Figures,
 }
@@ -164,10 +166,15 @@ impl Map {
             .map(|name| serde_json::json!({ "from": name.from, "to": name.to }))
             .collect();
         let Figures { nodes, devices, helpers } = self.figures;
+        let scale: serde_json::Map<String, serde_json::Value> = self
+            .scales
+            .iter()
+            .map(|(domain, factor)| (domain.name().to_string(), (*factor).into()))
+            .collect();
         serde_json::json!({
             "schema": 1,
             "dialect": self.dialect,
-            "scale": {},
+            "scale": scale,
             "variables": variables,
             "cards": cards,
             "renamed": renamed,
@@ -209,9 +216,19 @@ impl Map {
             cards,
             parameters: vec![],
             renamed: vec![],
+            scales: scales(json),
             figures,
         })
     }
+}
+
+/// The scales of a map's JSON.
+fn scales(json: &serde_json::Value) -> Vec<(Domain, f64)> {
+    let scale = json.get("scale").and_then(|scale| scale.as_object());
+    let of = |(name, factor): (&String, &serde_json::Value)| {
+        Some((Domain::named(name)?, factor.as_f64()?))
+    };
+    scale.into_iter().flatten().filter_map(of).collect()
 }
 
 /// Whether a number stands in an expression.
@@ -250,7 +267,8 @@ impl Builder<'_> {
         let renamed = self.namer.renamed.clone();
         let values = self.graph.parameters.iter().map(|parameter| parameter.value);
         let parameters = self.parameters.iter().copied().zip(values).collect();
-        Map { dialect: "ngspice", variables, cards, parameters, renamed, figures }
+        let scales = self.graph.scales.iter().map(|scale| (scale.domain, scale.factor)).collect();
+        Map { dialect: "ngspice", variables, cards, parameters, renamed, scales, figures }
     }
 
     fn observed(&self) -> Vec<Variable> {
@@ -317,11 +335,11 @@ impl Builder<'_> {
         for id in graph.vertex_ids() {
             let vertex = graph.vertex(id);
             let name = &vertex.name;
-            let mut push = |bg: String, expr, unit: &str, domain| {
+            let mut push = |bg: String, expr, unit: &str, domain, power| {
                 variables.push(Variable {
                     bg,
                     expr,
-                    factor: 1.0,
+                    factor: graph.unscale(domain, power),
                     unit: unit.to_string(),
                     domain,
                     observed: false,
@@ -331,18 +349,24 @@ impl Builder<'_> {
             let domain = graph.bond(first).domain;
             let row = domain.row();
             match &vertex.law {
-                Law::Zero => push(format!("e({name})"), self.effort(first), row.effort, domain),
+                Law::Zero => push(format!("e({name})"), self.effort(first), row.effort, domain, 1),
                 Law::One => {
                     let flow = self.flow(first, Speaker::Output);
-                    push(format!("f({name})"), flow, row.flow, domain);
+                    push(format!("f({name})"), flow, row.flow, domain, -1);
                 }
                 Law::Transformer(_) | Law::Gyrator(_) => {
                     for (port, bond) in vertex.bonds.iter().enumerate() {
                         let domain = graph.bond(*bond).domain;
                         let (row, port) = (domain.row(), port + 1);
-                        push(format!("e({name}.{port})"), self.effort(*bond), row.effort, domain);
+                        push(
+                            format!("e({name}.{port})"),
+                            self.effort(*bond),
+                            row.effort,
+                            domain,
+                            1,
+                        );
                         let flow = self.flow(*bond, Speaker::Output);
-                        push(format!("f({name}.{port})"), flow, row.flow, domain);
+                        push(format!("f({name}.{port})"), flow, row.flow, domain, -1);
                     }
                 }
                 _ => {
@@ -355,15 +379,15 @@ impl Builder<'_> {
                             Law::Source { detector: false, .. } => self.flow(bond, Speaker::Output),
                             _ => self.own_power(end, Power::Flow, Speaker::Output),
                         };
-                        push(format!("e({name})"), self.effort(bond), row.effort, domain);
-                        push(format!("f({name})"), flow, row.flow, domain);
+                        push(format!("e({name})"), self.effort(bond), row.effort, domain, 1);
+                        push(format!("f({name})"), flow, row.flow, domain, -1);
                         if let Some(kind) = graph.storage(end) {
-                            let (letter, unit) = match kind {
-                                Storage::Compliance => ('q', row.displacement),
-                                Storage::Inertia => ('p', row.momentum),
+                            let (letter, unit, power) = match kind {
+                                Storage::Compliance => ('q', row.displacement, -1),
+                                Storage::Inertia => ('p', row.momentum, 1),
                             };
                             let stored = self.stored(end, Speaker::Output);
-                            push(format!("{letter}({name})"), stored, unit, domain);
+                            push(format!("{letter}({name})"), stored, unit, domain, power);
                         }
                     }
                 }
@@ -379,14 +403,14 @@ impl Builder<'_> {
             let name = graph.bond_name(bond);
             let nth = count.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
             let name = if *nth > 1 { format!("{name} [{nth}]") } else { name };
-            for (letter, expr, unit) in [
-                ('e', self.effort(bond), domain.row().effort),
-                ('f', self.flow(bond, Speaker::Output), domain.row().flow),
+            for (letter, expr, unit, power) in [
+                ('e', self.effort(bond), domain.row().effort, 1),
+                ('f', self.flow(bond, Speaker::Output), domain.row().flow, -1),
             ] {
                 variables.push(Variable {
                     bg: format!("{letter}({name})"),
                     expr,
-                    factor: 1.0,
+                    factor: graph.unscale(domain, power),
                     unit: unit.to_string(),
                     domain,
                     observed: false,

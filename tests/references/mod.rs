@@ -1,5 +1,8 @@
 //! Reading references and comparing with them, for several tests.
 
+// Each test uses its part.
+#![allow(dead_code)]
+
 use bondspice::bond::elaborate::Overrides;
 use bondspice::trace::{Trace, compare, csv};
 
@@ -53,14 +56,12 @@ pub fn common(trace: &Trace, reference: Trace, least: usize) -> Trace {
 }
 
 /// A run of the actuator with two lines, in the names of its reference.
-#[allow(dead_code)]
 pub struct TwoLines {
     drives: [&'static str; 2],
     until: &'static str,
 }
 
 /// The runs by the names of their references.
-#[allow(dead_code)]
 pub const TWO_LINES: [(&str, TwoLines); 2] = [
     (
         "two_line_step",
@@ -84,7 +85,6 @@ pub const TWO_LINES: [(&str, TwoLines); 2] = [
     ),
 ];
 
-#[allow(dead_code)]
 impl TwoLines {
     /// What to change in `eha_two_line.bg`.
     pub fn overrides(&self, reltol: Option<&str>) -> Overrides {

@@ -3,7 +3,7 @@
 use bondspice::bond::causality::{self, Causality};
 use bondspice::bond::elaborate::{self, Overrides};
 use bondspice::bond::graph::BondGraph;
-use bondspice::bond::initial;
+use bondspice::bond::{initial, scale};
 use bondspice::netlist::write::write;
 use bondspice::source::SourceMap;
 use bondspice::translate::{Translation, translate};
@@ -62,7 +62,8 @@ pub fn translated(model: &Path, overrides: &Overrides) -> Translated {
     let mut d = vec![];
     let program = elaborate::load(&mut map, file, &overrides.folders, &mut d);
     let graph = elaborate::elaborate(&program, &map, overrides, &mut d);
-    let graph = graph.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
+    let mut graph = graph.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
+    scale::scale(&mut graph, &overrides.scale);
     let causality = causality::assign(&graph, &mut d);
     let causality = causality.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
     let initial = initial::solve(&graph, &causality, &mut d);

@@ -68,6 +68,8 @@ pub struct Overrides {
     pub options: Vec<(String, String)>,
     /// `-I`: folders in which imports are looked for.
     pub folders: Vec<String>,
+    /// `--scale`: domains and their factors, later ones winning; applied to the elaborated graph.
+    pub scale: Vec<(crate::quantity::Domain, f64)>,
 }
 
 /// Every function beyond those of expressions, and its form: `lag(x, tau, [ic])`.
