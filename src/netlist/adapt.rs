@@ -118,6 +118,7 @@ pub fn adapt(netlist: &Netlist, dialect: &Dialect, d: &mut Vec<Diagnostic>) -> O
     }
     let mut netlist = netlist.clone();
     let mut senses = vec![];
+    netlist.header.retain(|(key, _)| key != "dialect");
     if dialect.name != NGSPICE.name {
         netlist.header.insert(0, ("dialect".to_string(), dialect.name.to_string()));
     }

@@ -22,6 +22,9 @@ use std::collections::{HashMap, HashSet};
 /// More elements, signals, parameters and instances than this are a slip of the pen.
 pub const MOST_PARTS: usize = 250_000;
 
+/// What is wrong this often, in loops and instances, needs no further rounds.
+const MOST_SAID: usize = 5_000;
+
 impl<'a> Scope<'a> {
     /// Collects every declaration of a program. `set`: what the command line sets, read.
     pub fn collect(
@@ -481,6 +484,10 @@ impl<'a> Scope<'a> {
             + self.parameters.len()
             + self.frames.len()
             + self.rounds.len();
+        if d.len() > MOST_SAID {
+            // Nobody reads on, and there will be no graph.
+            return true;
+        }
         if parts <= MOST_PARTS && self.clock <= 4 * MOST_PARTS {
             return false;
         }
