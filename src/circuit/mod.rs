@@ -81,9 +81,11 @@ pub enum DeviceKind {
     },
     VoltageSource {
         waveform: Waveform,
+        parts: Parts,
     },
     CurrentSource {
         waveform: Waveform,
+        parts: Parts,
     },
     /// v = gain·(v(c+) − v(c−)).
     Vcvs {
@@ -139,6 +141,24 @@ pub enum DeviceKind {
         model: DiodeModel,
         area: f64,
     },
+}
+
+/// What an independent source is outside a run over time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Its value in `.op` and `.dc`, in V or A; without one that of its waveform at t = 0.
+    pub dc: Option<f64>,
+    /// Its phasor in `.ac`; without one 0.
+    pub ac: Option<Phasor>,
+}
+
+/// A quantity that swings at one frequency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Phasor {
+    /// In V or A.
+    pub magnitude: f64,
+    /// In radians.
+    pub phase: f64,
 }
 
 /// Parameters of the level-1 diode in SI, at the nominal temperature of 27 °C.

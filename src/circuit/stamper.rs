@@ -4,7 +4,7 @@ use super::devices::{self, Branch};
 use super::stamps::{
     Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
 };
-use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Waveform};
+use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Parts, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary};
 
@@ -304,10 +304,12 @@ impl<'a> Stamper<'a> {
         &mut self,
         device: DeviceId,
         waveform: &Waveform,
+        parts: Parts,
         into: Vec<(UnknownId, f64)>,
     ) {
         if !into.is_empty() {
-            self.stamps.sources.push(SourceStamp { device, waveform: waveform.clone(), into });
+            let waveform = waveform.clone();
+            self.stamps.sources.push(SourceStamp { device, waveform, parts, into });
         }
     }
 

@@ -13,7 +13,7 @@
 
 use super::devices;
 use super::stamper::Stamper;
-use super::{Circuit, DeviceId, Waveform};
+use super::{Circuit, DeviceId, Parts, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr;
 use crate::source::Span;
@@ -120,6 +120,8 @@ pub struct SourceStamp {
     pub device: DeviceId,
     /// The function of time.
     pub waveform: Waveform,
+    /// What it is in other analyses.
+    pub parts: Parts,
     /// The equations it enters.
     pub into: Vec<(UnknownId, f64)>,
 }

@@ -216,8 +216,13 @@ pub fn circuit(circuit: &Circuit) -> String {
             DeviceKind::Mutual { inductors: [a, b], coupling } => {
                 format!("{} {} {}", device(*a), device(*b), number(*coupling))
             }
-            DeviceKind::VoltageSource { waveform } | DeviceKind::CurrentSource { waveform } => {
-                self::waveform(waveform)
+            DeviceKind::VoltageSource { waveform, parts }
+            | DeviceKind::CurrentSource { waveform, parts } => {
+                let dc = parts.dc.map_or(String::new(), |dc| format!(" dc={}", number(dc)));
+                let ac = parts.ac.map_or(String::new(), |ac| {
+                    format!(" ac={} at {} deg", number(ac.magnitude), number(ac.phase.to_degrees()))
+                });
+                self::waveform(waveform) + &dc + &ac
             }
             DeviceKind::Vcvs { gain, control: [a, b] }
             | DeviceKind::Vccs { gain, control: [a, b] } => {

@@ -1,7 +1,7 @@
 //! A netlist in the words that a dialect has.
 
 use super::dialects::{Dialect, NGSPICE, Switches};
-use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Waveform};
+use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Source, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
 use crate::source::Span;
@@ -46,10 +46,10 @@ pub const DIODE: Lack = Lack {
 /// A sine that starts at an angle.
 pub const PHASE: Lack = Lack {
     needed: |element, _| {
-        let (Element::VoltageSource(waveform) | Element::CurrentSource(waveform)) = element else {
+        let (Element::VoltageSource(source) | Element::CurrentSource(source)) = element else {
             return false;
         };
-        match waveform {
+        match &source.waveform {
             Waveform::Function { shape: Shape::Sin, arguments } => {
                 arguments.get(PLAIN_SINE).is_some_and(|phase| phase.as_number() != Some(0.0))
             }
@@ -166,10 +166,14 @@ fn scope(
             }
             CardKind::Device(Device {
                 element:
-                    Element::VoltageSource(Waveform::Function { shape: Shape::Sin, arguments })
-                    | Element::CurrentSource(Waveform::Function { shape: Shape::Sin, arguments }),
+                    Element::VoltageSource(Source { waveform, .. })
+                    | Element::CurrentSource(Source { waveform, .. }),
                 ..
-            }) if !dialect.phases => arguments.truncate(PLAIN_SINE),
+            }) if !dialect.phases => {
+                if let Waveform::Function { shape: Shape::Sin, arguments } = waveform {
+                    arguments.truncate(PLAIN_SINE);
+                }
+            }
             _ => {}
         }
     }
@@ -205,7 +209,7 @@ fn sense(cards: &mut Vec<Card>, names: &mut Names, senses: &mut Vec<(String, Str
         let nodes = vec![node, std::mem::replace(minus, node)];
         carriers.insert(device.name, carrier);
         senses.push((names.text(carrier).to_string(), carried.clone()));
-        let element = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)));
+        let element = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)).into());
         let kind = CardKind::Device(Device { name: carrier, nodes, element });
         let comment = Some(format!("carries the current of {carried}"));
         cards.insert(at, Card { kind, span: Span::NONE, comment });

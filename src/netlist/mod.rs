@@ -121,8 +121,8 @@ pub enum Element {
         inductors: Vec<Name>,
         coupling: Expr,
     },
-    VoltageSource(Waveform),
-    CurrentSource(Waveform),
+    VoltageSource(Source),
+    CurrentSource(Source),
     Vcvs {
         gain: Expr,
         control: [Name; 2],
@@ -174,7 +174,25 @@ pub enum Element {
     },
 }
 
-/// The value of an independent source.
+/// What an independent source says: `[DC] value`, `AC magnitude phase`, a function of time.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its value over time.
+    pub waveform: Waveform,
+    /// Its value in `.op`, `.dc` and where an analysis begins at an operating point of its own, where that is not the
+    /// waveform's at the start.
+    pub dc: Option<Expr>,
+    /// Magnitude, and phase in degrees, in `.ac`.
+    pub ac: Option<[Expr; 2]>,
+}
+
+impl From<Waveform> for Source {
+    fn from(waveform: Waveform) -> Source {
+        Source { waveform, dc: None, ac: None }
+    }
+}
+
+/// The value of an independent source over time.
 #[derive(Clone, Debug)]
 pub enum Waveform {
     /// DC, or a bare value.

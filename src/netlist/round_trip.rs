@@ -1,6 +1,6 @@
 //! What is written reads back as the same netlist: the same text again, and the same bits in every number.
 
-use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Waveform};
+use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Source, Waveform};
 use crate::circuit::{self, Circuit, DeviceKind};
 use crate::expr::{Binary, Function, Node};
 use crate::netlist::{Leaf, flatten::flatten, read::read, write::write};
@@ -103,8 +103,16 @@ fn sample(values: &[f64], law: u64) -> Netlist {
         .map(|k| Expr::number(f64::from(k) + number().as_number().unwrap_or(0.0).abs().fract()))
         .collect();
     let waveform = Waveform::Function { shape: Shape::Pwl, arguments };
-    device("V_1", Element::VoltageSource(waveform), None);
-    device("I_1", Element::CurrentSource(Waveform::Constant(number())), None);
+    device(
+        "V_1",
+        Element::VoltageSource(Source {
+            waveform,
+            dc: Some(number()),
+            ac: Some([number(), number()]),
+        }),
+        None,
+    );
+    device("I_1", Element::CurrentSource(Waveform::Constant(number()).into()), None);
     let current = |text: &mut Names| Expr::leaf(Leaf::Current(text.intern("V_1")));
     let reading = current(&mut names);
     let law = tree(law, a, b, &reading, &mut number, 0);

@@ -5,7 +5,9 @@
 //! comment stands at the end of its line where there is room, else on a line above.
 
 use super::dialects::{Comments, Dialect, NGSPICE};
-use super::{Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Shape, Waveform};
+use super::{
+    Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Source, Waveform, read,
+};
 use crate::expr::print::{number, print};
 
 /// Lines are shorter than this.
@@ -167,28 +169,9 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
             words.extend(inductors.iter().map(name));
             words.push(value(form, coupling));
         }
-        Element::VoltageSource(waveform) | Element::CurrentSource(waveform) => match waveform {
-            Waveform::Constant(constant) => words.push(value(form, constant)),
-            Waveform::Function { shape, arguments } => {
-                let shape = match shape {
-                    Shape::Pulse => "PULSE",
-                    Shape::Sin => "SIN",
-                    Shape::Pwl => "PWL",
-                    Shape::Exp => "EXP",
-                    Shape::Sffm => "SFFM",
-                };
-                let mut arguments: Vec<String> =
-                    arguments.iter().map(|argument| value(form, argument)).collect();
-                match arguments.first_mut() {
-                    Some(first) => *first = format!("{shape}({first}"),
-                    None => arguments.push(format!("{shape}(")),
-                }
-                if let Some(last) = arguments.last_mut() {
-                    last.push(')');
-                }
-                words.extend(arguments);
-            }
-        },
+        Element::VoltageSource(source) | Element::CurrentSource(source) => {
+            words.extend(source_words(form, source));
+        }
         Element::Vcvs { gain, control } | Element::Vccs { gain, control } => {
             words.extend(control.iter().map(name));
             words.push(value(form, gain));
@@ -224,6 +207,34 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
             words.push(name(subcircuit));
             words.extend(assignments(form, parameters));
         }
+    }
+    words
+}
+
+/// What an independent source says behind its nodes.
+fn source_words(form: Form, source: &Source) -> Vec<String> {
+    let mut words = vec![];
+    match (&source.dc, &source.waveform) {
+        (Some(dc), _) => words.extend(["DC".to_string(), value(form, dc)]),
+        // What stands before `AC` is read as the value, with or without a word for it.
+        (None, Waveform::Constant(constant)) => words.push(value(form, constant)),
+        (None, Waveform::Function { .. }) => {}
+    }
+    if let Some([magnitude, phase]) = &source.ac {
+        words.extend(["AC".to_string(), value(form, magnitude), value(form, phase)]);
+    }
+    if let Waveform::Function { shape, arguments } = &source.waveform {
+        let shape = read::waveforms::row(*shape).name.to_uppercase();
+        let mut arguments: Vec<String> =
+            arguments.iter().map(|argument| value(form, argument)).collect();
+        match arguments.first_mut() {
+            Some(first) => *first = format!("{shape}({first}"),
+            None => arguments.push(format!("{shape}(")),
+        }
+        if let Some(last) = arguments.last_mut() {
+            last.push(')');
+        }
+        words.extend(arguments);
     }
     words
 }
@@ -315,6 +326,7 @@ fn line(text: &mut String, words: &[String], comment: Option<&str>, comments: Co
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::Shape;
     use crate::source::Span;
 
     fn number(value: f64) -> Expr {
@@ -346,10 +358,13 @@ mod tests {
                 device(
                     v,
                     [a, ground],
-                    Element::VoltageSource(Waveform::Function {
-                        shape: Shape::Pwl,
-                        arguments: vec![number(0.0), number(1.0)],
-                    }),
+                    Element::VoltageSource(
+                        Waveform::Function {
+                            shape: Shape::Pwl,
+                            arguments: vec![number(0.0), number(1.0)],
+                        }
+                        .into(),
+                    ),
                     "",
                 ),
                 device(

@@ -1,6 +1,7 @@
 //! Runs against closed forms, orders of convergence, and what goes wrong.
 
 use super::*;
+use crate::circuit::Parts;
 use crate::circuit::stamps::{Stamps, stamp};
 use crate::circuit::{
     Circuit, Device, DeviceId, DeviceKind, DiodeModel, Expr, Leaf, Node, NodeId, Waveform,
@@ -60,7 +61,7 @@ fn l(inductance: f64, initial: f64) -> DeviceKind {
 }
 
 fn v(waveform: Waveform) -> DeviceKind {
-    DeviceKind::VoltageSource { waveform }
+    DeviceKind::VoltageSource { waveform, parts: Parts::default() }
 }
 
 fn dc(value: f64) -> DeviceKind {
@@ -607,7 +608,7 @@ fn floating_nodes_and_loops_of_sources_are_named() {
     let found = errors(vec![(
         "I1",
         vec![0, 1],
-        DeviceKind::CurrentSource { waveform: Waveform::Constant(1.0) },
+        DeviceKind::CurrentSource { waveform: Waveform::Constant(1.0), parts: Parts::default() },
     )]);
     assert_eq!(found[0].code, "E0780");
 }

@@ -111,7 +111,7 @@ impl Builder<'_> {
                 None => format!("0 V, carries f({})", self.graph.bond_name(bond)),
             };
             let span = self.graph.bond(bond).span;
-            let value = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)));
+            let value = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)).into());
             self.device(device, nodes, value, span, &what);
         }
     }
@@ -158,15 +158,15 @@ impl Builder<'_> {
             Form::Junction | Form::Open | Form::Field { .. } => {}
             Form::Short { device } => {
                 let value = Waveform::Constant(Expr::number(0.0));
-                self.device(*device, nodes, Element::VoltageSource(value), span, &what);
+                self.device(*device, nodes, Element::VoltageSource(value.into()), span, &what);
             }
             Form::EffortSource { device, value } => {
                 let element = match value {
                     SourceValue::Constant(value) => {
-                        Element::VoltageSource(Waveform::Constant(self.constant(value)))
+                        Element::VoltageSource(Waveform::Constant(self.constant(value)).into())
                     }
                     SourceValue::Waveform(signal) => {
-                        Element::VoltageSource(self.waveform(*signal, *device))
+                        Element::VoltageSource(self.waveform(*signal, *device).into())
                     }
                     SourceValue::Copy(signal) => self.copy_of(*signal, true),
                     SourceValue::Law(expr) => Element::BehaviouralVoltage { law: law(self, expr)? },
@@ -178,10 +178,10 @@ impl Builder<'_> {
                 let nodes = if from_here { [nodes[1], nodes[0]] } else { nodes };
                 let element = match value {
                     SourceValue::Constant(value) => {
-                        Element::CurrentSource(Waveform::Constant(self.constant(value)))
+                        Element::CurrentSource(Waveform::Constant(self.constant(value)).into())
                     }
                     SourceValue::Waveform(signal) => {
-                        Element::CurrentSource(self.waveform(*signal, *device))
+                        Element::CurrentSource(self.waveform(*signal, *device).into())
                     }
                     SourceValue::Copy(signal) => self.copy_of(*signal, false),
                     SourceValue::Law(expr) => Element::BehaviouralCurrent { law: law(self, expr)? },

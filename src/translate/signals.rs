@@ -83,7 +83,13 @@ impl Builder<'_> {
             SignalLaw::Algebraic(expr) if is_constant(expr) => {
                 let device = self.namer.device('V', &signal.name);
                 let value = netlist::Waveform::Constant(self.constant(expr));
-                self.device(device, nodes, Element::VoltageSource(value), signal.span, &what);
+                self.device(
+                    device,
+                    nodes,
+                    Element::VoltageSource(value.into()),
+                    signal.span,
+                    &what,
+                );
             }
             SignalLaw::Algebraic(expr) => {
                 let law = self.value(expr, None, card)?;
@@ -122,7 +128,13 @@ impl Builder<'_> {
             SignalLaw::Waveform(_) => {
                 let device = self.namer.device('V', &signal.name);
                 let value = self.waveform(id, device);
-                self.device(device, nodes, Element::VoltageSource(value), signal.span, &what);
+                self.device(
+                    device,
+                    nodes,
+                    Element::VoltageSource(value.into()),
+                    signal.span,
+                    &what,
+                );
             }
         }
         Ok(())
@@ -196,7 +208,7 @@ impl Builder<'_> {
                 let arguments =
                     vec![low, high, delay, edge.clone(), edge, width, self.constant(period)];
                 let waveform = netlist::Waveform::Function { shape: Shape::Pulse, arguments };
-                let element = Element::VoltageSource(waveform);
+                let element = Element::VoltageSource(waveform.into());
                 self.device(clock_source, [clock, ground], element, span, what);
                 let device = self.namer.device('S', name);
                 let values =
@@ -232,7 +244,7 @@ impl Builder<'_> {
                 };
                 let supply = self.namer.node(&format!("{name}_one"));
                 let device = self.namer.device('V', &format!("{name}_one"));
-                let one = Element::VoltageSource(netlist::Waveform::Constant(number(1.0)));
+                let one = Element::VoltageSource(netlist::Waveform::Constant(number(1.0)).into());
                 self.device(device, [supply, ground], one, span, what);
                 let device = self.namer.device('S', name);
                 let (low, high) = (self.constant(low), self.constant(high));

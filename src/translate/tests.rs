@@ -4,7 +4,7 @@
 use super::*;
 use crate::bond::build::*;
 use crate::bond::graph::*;
-use crate::netlist::{self, Leaf as NetLeaf, Name, Waveform as NetWaveform};
+use crate::netlist::{self, Leaf as NetLeaf, Name, Source as NetSource, Waveform as NetWaveform};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
@@ -187,8 +187,12 @@ impl Solved {
                 Element::Resistor { value: r } => current = across(1.0 / value(r), a, b),
                 Element::Capacitor { value: c, .. } => current = across(S * value(c), a, b),
                 Element::Inductor { value: l, .. } => rows[row].0.push((row, -S * value(l))),
-                Element::VoltageSource(NetWaveform::Constant(v)) => rows[row].1 = value(v),
-                Element::CurrentSource(NetWaveform::Constant(i)) => forced = value(i),
+                Element::VoltageSource(NetSource {
+                    waveform: NetWaveform::Constant(v), ..
+                }) => rows[row].1 = value(v),
+                Element::CurrentSource(NetSource {
+                    waveform: NetWaveform::Constant(i), ..
+                }) => forced = value(i),
                 Element::Vcvs { gain, control } => {
                     let terms = across(-value(gain), node(control[0]), node(control[1]));
                     rows[row].0.extend(terms);
@@ -252,7 +256,9 @@ pub fn compare(graph: &BondGraph) -> Option<usize> {
                 S * value.constant().unwrap()
                     * (voltage(device.nodes[0]) - voltage(device.nodes[1]))
             }
-            Element::CurrentSource(NetWaveform::Constant(value)) => value.constant().unwrap(),
+            Element::CurrentSource(NetSource {
+                waveform: NetWaveform::Constant(value), ..
+            }) => value.constant().unwrap(),
             other => panic!("current of {other:?}"),
         }
     };

@@ -148,8 +148,8 @@ impl Check<'_> {
         let all = equations(self.graph);
         let until = self.graph.experiment.until.filter(|t| *t > 0.0).unwrap_or(1.0);
         for device in 0..self.text.circuit.devices.len() {
-            let (DeviceKind::VoltageSource { waveform } | DeviceKind::CurrentSource { waveform }) =
-                &self.text.circuit.devices[device].kind
+            let (DeviceKind::VoltageSource { waveform, .. }
+            | DeviceKind::CurrentSource { waveform, .. }) = &self.text.circuit.devices[device].kind
             else {
                 continue;
             };
@@ -219,7 +219,7 @@ impl Check<'_> {
         let (
             DeviceKind::Switch { on, off, on_resistance, off_resistance, initially_on, .. },
             DeviceKind::Resistor { resistance },
-            DeviceKind::VoltageSource { waveform: Waveform::Constant(volts) },
+            DeviceKind::VoltageSource { waveform: Waveform::Constant(volts), .. },
             DeviceKind::BehaviouralVoltage { law },
         ) = (
             &circuit[switch].kind,
@@ -296,8 +296,10 @@ impl Check<'_> {
             return Some((Some(capacitor), "it does not stand at the node that holds".into()));
         }
         let (pending, element) = self.text.element(clock)?;
-        let Element::VoltageSource(netlist::Waveform::Function { shape: Shape::Pulse, arguments }) =
-            element
+        let Element::VoltageSource(netlist::Source {
+            waveform: netlist::Waveform::Function { shape: Shape::Pulse, arguments },
+            ..
+        }) = element
         else {
             return Some((Some(clock), "it is no clock".into()));
         };

@@ -17,17 +17,17 @@ pub const ROW: Row = Row {
 };
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
-    let DeviceKind::CurrentSource { waveform } = &stamper.device(id).kind else { return };
+    let DeviceKind::CurrentSource { waveform, parts } = &stamper.device(id).kind else { return };
     match stamper.branch(id) {
         Some(branch) => {
             stamper.through(id, branch);
             stamper.conductance(Some(branch), Some(branch), 1.0);
-            stamper.add_source(id, waveform, vec![(branch, 1.0)]);
+            stamper.add_source(id, waveform, *parts, vec![(branch, 1.0)]);
         }
         None => {
             let leaving = stamper.leaving(stamper.ends(id));
             let right = leaving.into_iter().map(|(row, sign)| (row, -sign)).collect();
-            stamper.add_source(id, waveform, right);
+            stamper.add_source(id, waveform, *parts, right);
         }
     }
 }
@@ -36,12 +36,13 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 mod tests {
     use crate::circuit::DeviceKind::{Ccvs, CurrentSource};
     use crate::circuit::devices::testing::*;
-    use crate::circuit::{DeviceId, Waveform};
+    use crate::circuit::{DeviceId, Parts, Waveform};
 
     #[test]
     fn draws_from_its_first_node() {
         let waveform = Waveform::Constant(2.0);
-        let stamps = stamps(vec![("i1", vec![1, 2], CurrentSource { waveform })]);
+        let stamps =
+            stamps(vec![("i1", vec![1, 2], CurrentSource { waveform, parts: Parts::default() })]);
         assert_eq!(sources(&stamps, 0.0), [-2.0, 2.0]);
     }
 
@@ -49,7 +50,7 @@ mod tests {
     fn has_a_branch_where_it_is_read() {
         let waveform = Waveform::Constant(2.0);
         let stamps = stamps(vec![
-            ("i1", vec![1, 0], CurrentSource { waveform }),
+            ("i1", vec![1, 0], CurrentSource { waveform, parts: Parts::default() }),
             ("h1", vec![2, 0], Ccvs { gain: 3.0, control: DeviceId(0) }),
         ]);
         let expected = [

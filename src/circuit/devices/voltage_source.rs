@@ -15,24 +15,25 @@ pub const ROW: Row = Row {
 };
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
-    let DeviceKind::VoltageSource { waveform } = &stamper.device(id).kind else { return };
+    let DeviceKind::VoltageSource { waveform, parts } = &stamper.device(id).kind else { return };
     let Some(branch) = stamper.branch(id) else { return };
     let ends = stamper.ends(id);
     stamper.through(id, branch);
     stamper.difference(Some(branch), ends, 1.0);
-    stamper.add_source(id, waveform, vec![(branch, 1.0)]);
+    stamper.add_source(id, waveform, *parts, vec![(branch, 1.0)]);
 }
 
 #[cfg(test)]
 mod tests {
     use crate::circuit::DeviceKind::VoltageSource;
-    use crate::circuit::Waveform;
     use crate::circuit::devices::testing::*;
+    use crate::circuit::{Parts, Waveform};
 
     #[test]
     fn stamps_a_branch_and_a_right_hand_side() {
         let waveform = Waveform::Pwl(vec![(0.0, 0.0), (1.0, 6.0)]);
-        let stamps = stamps(vec![("v1", vec![1, 2], VoltageSource { waveform })]);
+        let stamps =
+            stamps(vec![("v1", vec![1, 2], VoltageSource { waveform, parts: Parts::default() })]);
         assert_eq!(conductances(&stamps), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, -1.0, 0.0]]);
         assert_eq!(sources(&stamps, 0.5), [0.0, 0.0, 3.0]);
     }

@@ -3,7 +3,7 @@
 use super::expand::{Flat, Pending};
 use super::sources::{self, Times};
 use super::values::Lookup;
-use crate::circuit::{self, Device, DeviceKind, DiodeModel, NodeId};
+use crate::circuit::{self, Device, DeviceKind, DiodeModel, NodeId, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
 use crate::netlist::{Element, Expr, Name};
@@ -40,8 +40,12 @@ fn sampled(flat: &Flat, pending: &Pending, header: &Header) -> Option<DeviceKind
         let nothing = circuit::Waveform::Constant(0.0);
         match (is(&sample.switch), is(&sample.capacitor), is(&sample.clock)) {
             (true, ..) => Some(DeviceKind::Hold { period: sample.period, round: sample.round }),
-            (_, true, _) => Some(DeviceKind::CurrentSource { waveform: nothing }),
-            (.., true) => Some(DeviceKind::VoltageSource { waveform: nothing }),
+            (_, true, _) => {
+                Some(DeviceKind::CurrentSource { waveform: nothing, parts: Parts::default() })
+            }
+            (.., true) => {
+                Some(DeviceKind::VoltageSource { waveform: nothing, parts: Parts::default() })
+            }
             _ => None,
         }
     })
@@ -79,12 +83,16 @@ fn kind(
             let second = lookup.device(scope, second, span, d);
             DeviceKind::Mutual { inductors: [first?, second?], coupling: number(coupling, d)? }
         }
-        Element::VoltageSource(waveform) => DeviceKind::VoltageSource {
-            waveform: sources::waveform(lookup, pending, waveform, header, times, d)?,
-        },
-        Element::CurrentSource(waveform) => DeviceKind::CurrentSource {
-            waveform: sources::waveform(lookup, pending, waveform, header, times, d)?,
-        },
+        Element::VoltageSource(source) => {
+            let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
+            let parts = sources::parts(lookup, pending, source, d);
+            DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
+        }
+        Element::CurrentSource(source) => {
+            let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
+            let parts = sources::parts(lookup, pending, source, d);
+            DeviceKind::CurrentSource { waveform: waveform?, parts: parts? }
+        }
         Element::Vcvs { gain, control } => {
             let (gain, control) = (number(gain, d), nodes(control, d));
             DeviceKind::Vcvs { gain: gain?, control: control? }

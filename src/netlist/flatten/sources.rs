@@ -13,11 +13,11 @@
 
 use super::expand::Pending;
 use super::values::Lookup;
-use crate::circuit::{self, Analysis};
+use crate::circuit::{self, Analysis, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::{Header, Jumps};
 use crate::netlist::read::waveforms;
-use crate::netlist::{Shape, Waveform};
+use crate::netlist::{Expr, Shape, Source, Waveform};
 
 /// Step and end of the transient analysis.
 #[derive(Clone, Copy)]
@@ -118,6 +118,36 @@ pub fn waveform(
             None
         }
     }
+}
+
+/// What a source is outside a run over time.
+pub fn parts(
+    lookup: &Lookup,
+    pending: &Pending,
+    source: &Source,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Parts> {
+    let mut number = |expr: &Expr| {
+        let value = lookup.number(pending.scope, expr, d)?;
+        if !value.is_finite() {
+            let message = format!("a value of the source is {value}");
+            d.push(Diagnostic::error("E0744", pending.card.span, message));
+            return None;
+        }
+        Some(value)
+    };
+    let dc = match &source.dc {
+        Some(expr) => Some(number(expr)?),
+        None => None,
+    };
+    let ac = match &source.ac {
+        Some([magnitude, phase]) => Some(circuit::Phasor {
+            magnitude: number(magnitude)?,
+            phase: number(phase)?.to_radians(),
+        }),
+        None => None,
+    };
+    Some(Parts { dc, ac })
 }
 
 /// The points of a PWL; a steep segment that starts at a jump loses its width.

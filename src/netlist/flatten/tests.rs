@@ -123,12 +123,31 @@ fn models_become_numbers() {
 }
 
 #[test]
+fn sources_keep_their_parts_for_other_analyses() {
+    let c = circuit(
+        "t\nv1 a 0 DC 3 AC 2 90 SIN(0 1 50)\nv2 a 0 5 ac pulse(0 1)\nv3 a 0 SIN(0 1 50) ac={p} 45 dc=1\ni1 a 0 ac 1\nr1 a 0 1\n.param p=7\n.tran 1m 1 uic\n",
+    );
+    let parts = |name| match kind(&c, name) {
+        DeviceKind::VoltageSource { waveform, parts }
+        | DeviceKind::CurrentSource { waveform, parts } => {
+            (waveform.value(0.0), parts.dc, parts.ac.map(|ac| (ac.magnitude, ac.phase)))
+        }
+        other => panic!("{other:?}"),
+    };
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    assert_eq!(parts("v1"), (0.0, Some(3.0), Some((2.0, FRAC_PI_2))));
+    assert_eq!(parts("v2"), (0.0, Some(5.0), Some((1.0, 0.0))));
+    assert_eq!(parts("v3"), (0.0, Some(1.0), Some((7.0, FRAC_PI_4))));
+    assert_eq!(parts("i1"), (0.0, None, Some((1.0, 0.0))));
+}
+
+#[test]
 fn waveforms_take_the_defaults_of_spice() {
     let c = circuit(
         "t\nv1 a 0 PULSE(0 1)\nv2 a 0 PULSE(0 1 1u 0 2u 3u 4u)\nv3 a 0 SIN(0 1 0 0 0 90)\nv4 a 0 EXP(0 1)\nv5 a 0 PWL(0 0 1 2)\n.tran 1m 2 uic\n",
     );
     let waveform = |name| match kind(&c, name) {
-        DeviceKind::VoltageSource { waveform } => waveform.clone(),
+        DeviceKind::VoltageSource { waveform, .. } => waveform.clone(),
         other => panic!("{other:?}"),
     };
     let pulse = |delay, rise, fall, width, period| Waveform::Pulse {
@@ -166,11 +185,11 @@ fn the_header_is_honoured() {
     );
     let options: Vec<_> = c.options.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
     assert_eq!(options, [("reltol", "0.001"), ("hmax", "auto"), ("reltol", "1e-6")]);
-    let DeviceKind::VoltageSource { waveform } = kind(&c, "V_x") else { panic!() };
+    let DeviceKind::VoltageSource { waveform, .. } = kind(&c, "V_x") else { panic!() };
     assert_eq!(waveform, &Waveform::Pwl(vec![(0.0, 0.0), (0.1, 0.0), (0.1, 1.0), (1.0, 1.0)]));
     assert!(matches!(
         kind(&c, "V_p"),
-        DeviceKind::VoltageSource { waveform: Waveform::Pulse { rise: 0.0, fall: 1e-4, .. } }
+        DeviceKind::VoltageSource { waveform: Waveform::Pulse { rise: 0.0, fall: 1e-4, .. }, .. }
     ));
     assert_eq!(
         (c.nodes[1].nominal, c.nodes[2].nominal, c.devices[1].nominal),

@@ -106,8 +106,8 @@ impl<'a> Writer<'a> {
             }
             // It stands in the template of the inductors.
             Element::Mutual { .. } => {}
-            Element::VoltageSource(waveform) => self.source(card, device, waveform, true),
-            Element::CurrentSource(waveform) => self.source(card, device, waveform, false),
+            Element::VoltageSource(source) => self.source(card, device, &source.waveform, true),
+            Element::CurrentSource(source) => self.source(card, device, &source.waveform, false),
             Element::Vcvs { gain, control } => {
                 let template = linked("bg_vcvs", "voltage source linked to a voltage", true);
                 let template = template.voltage("k*(v(cp)-v(cm))");

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::expr::Node;
-use crate::netlist::{Device, Element, Expr, Leaf, Shape, Waveform};
+use crate::netlist::{Device, Element, Expr, Leaf, Shape, Source, Waveform};
 use proptest::prelude::*;
 
 fn read_text(text: &str) -> (Netlist, Vec<Diagnostic>) {
@@ -72,7 +72,7 @@ fn sources_and_their_waveforms() {
     {
         let (_, v) = device(line);
         let (Element::VoltageSource(w) | Element::CurrentSource(w)) = &v.element else { panic!() };
-        assert!(matches!(w, Waveform::Constant(value) if number(value) == 5.0), "{line}");
+        assert!(matches!(&w.waveform, Waveform::Constant(value) if number(value) == 5.0), "{line}");
     }
     for (line, shape, count) in [
         ("V1 a 0 PULSE(0 5 0 20n 20n 20u 50u)", Shape::Pulse, 7),
@@ -85,12 +85,14 @@ fn sources_and_their_waveforms() {
     ] {
         let (_, v) = device(line);
         let (Element::VoltageSource(w) | Element::CurrentSource(w)) = &v.element else { panic!() };
-        let Waveform::Function { shape: read, arguments } = w else { panic!("{line}: {w:?}") };
+        let Waveform::Function { shape: read, arguments } = &w.waveform else {
+            panic!("{line}: {w:?}")
+        };
         assert_eq!((*read, arguments.len()), (shape, count), "{line}");
     }
     let (_, v) = device("V1 a b");
     assert!(
-        matches!(&v.element, Element::VoltageSource(Waveform::Constant(value)) if number(value) == 0.0)
+        matches!(&v.element, Element::VoltageSource(Source { waveform: Waveform::Constant(value), .. }) if number(value) == 0.0)
     );
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Cursor, Reader};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::{Expr, Shape, Waveform};
+use crate::netlist::{Expr, Shape, Source, Waveform};
 
 /// One row of the table.
 pub struct Row {
@@ -37,41 +37,50 @@ pub fn row(shape: Shape) -> &'static Row {
     }
 }
 
-/// `[DC] value`, `AC …`, `PULSE( … )` and so on to the end of the line. Without any of them the value is 0.
-pub fn source(reader: &mut Reader, cursor: &mut Cursor) -> Option<Waveform> {
-    let (mut constant, mut function) = (None, None);
+/// `[DC] value`, `AC magnitude phase`, `PULSE( … )` and so on to the end of the line, in any order. Without any of them the
+/// value is 0; without a function of time it is the DC value.
+pub fn source(reader: &mut Reader, cursor: &mut Cursor) -> Option<Source> {
+    let (mut dc, mut ac, mut function) = (None, None, None);
     while !cursor.is_done() {
         let word = cursor.next_word();
         if word.eq_ignore_ascii_case("dc") {
             cursor.word();
             cursor.take(b'=');
-            constant = Some(reader.value(cursor, "the value")?);
+            dc = Some(reader.value(cursor, "the value")?);
         } else if word.eq_ignore_ascii_case("ac") {
-            // Magnitude and phase count in AC analysis alone.
             cursor.word();
             cursor.take(b'=');
-            for _ in 0..2 {
-                let starts = cursor
-                    .next_word()
-                    .starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+'));
-                if starts || matches!(cursor.peek(), Some(b'{' | b'\'')) {
-                    reader.value(cursor, "the magnitude")?;
-                }
-            }
+            ac = Some(phasor(reader, cursor)?);
         } else if let Some(row) = WAVEFORMS.iter().find(|row| row.name.eq_ignore_ascii_case(word)) {
             function = Some(arguments(reader, cursor, row)?);
-        } else if constant.is_none() && function.is_none() {
-            constant = Some(reader.value(cursor, "the value")?);
+        } else if dc.is_none() && function.is_none() {
+            dc = Some(reader.value(cursor, "the value")?);
         } else {
             reader.leftover(cursor);
             return None;
         }
     }
-    match (function, constant) {
-        (Some(function), _) => Some(function),
-        (None, Some(value)) => Some(Waveform::Constant(value)),
-        (None, None) => Some(Waveform::Constant(Expr::number(0.0))),
+    Some(match function {
+        Some(waveform) => Source { waveform, dc, ac },
+        None => {
+            Source { waveform: Waveform::Constant(dc.unwrap_or(Expr::number(0.0))), dc: None, ac }
+        }
+    })
+}
+
+/// Magnitude and phase in degrees, as far as they are written: 1 and 0 else.
+fn phasor(reader: &mut Reader, cursor: &mut Cursor) -> Option<[Expr; 2]> {
+    let mut parts = [Expr::number(1.0), Expr::number(0.0)];
+    for (part, what) in parts.iter_mut().zip(["the magnitude", "the phase"]) {
+        let word = cursor.next_word();
+        let keyword = ["dc", "ac"].iter().any(|key| key.eq_ignore_ascii_case(word))
+            || WAVEFORMS.iter().any(|row| row.name.eq_ignore_ascii_case(word));
+        if cursor.is_done() || keyword || cursor.clone().key().is_some() {
+            break;
+        }
+        *part = reader.value(cursor, what)?;
     }
+    Some(parts)
 }
 
 fn arguments(reader: &mut Reader, cursor: &mut Cursor, row: &Row) -> Option<Waveform> {

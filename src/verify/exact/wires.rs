@@ -389,16 +389,16 @@ impl<'t, F: Modular> Wires<'t, F> {
                 self.system.rows.push(row);
             }
             (DeviceKind::Mutual { .. }, _) => {}
-            (DeviceKind::VoltageSource { .. }, Element::VoltageSource(waveform)) => {
+            (DeviceKind::VoltageSource { .. }, Element::VoltageSource(source)) => {
                 let value = match own.kind {
                     // The clock of an exact sample.
                     _ if self.is_clock(device) => F::ZERO,
-                    _ => self.source(device, waveform)?,
+                    _ => self.source(device, &source.waveform)?,
                 };
                 self.system.rows.push(voltage.minus(&Form::number(value)));
             }
-            (DeviceKind::CurrentSource { .. }, Element::CurrentSource(waveform)) => {
-                self.currents[device] = Form::number(self.source(device, waveform)?);
+            (DeviceKind::CurrentSource { .. }, Element::CurrentSource(source)) => {
+                self.currents[device] = Form::number(self.source(device, &source.waveform)?);
             }
             (DeviceKind::Vcvs { control, .. }, _) => {
                 let control = self.between(control).times(self.value_of(device)?);
