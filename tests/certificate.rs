@@ -37,7 +37,9 @@ fn certificate(
     let netlist = Some(map.add("given.cir", text.to_string()));
     let question = Question { netlist, ..Question::default() };
     let mut d = vec![];
-    pipeline::certificate(map, model, &question, &mut d).map(|(found, _)| found).ok_or(d)
+    pipeline::certificate(map, model, &question, &Default::default(), &mut d)
+        .map(|(found, _)| found)
+        .ok_or(d)
 }
 
 fn models() -> Vec<String> {

@@ -44,7 +44,7 @@ fn fate(seed: u64) -> Fate {
     };
     let question = Question { seed: Some(seed), ..Question::default() };
     let mut d = vec![];
-    match pipeline::certificate(&mut map, &model, &question, &mut d) {
+    match pipeline::certificate(&mut map, &model, &question, &Default::default(), &mut d) {
         Some((found, _)) if found.holds() => Fate::Proven,
         Some((found, _)) => match &found.exact.singular {
             Some(why) if why.contains('(') || why.contains("depend") => {

@@ -27,7 +27,12 @@ fn netlist(text: &str) -> Netlist {
     let mut map = SourceMap::default();
     let file = map.add("deck.cir", text);
     let mut d = vec![];
-    let netlist = bondspice::netlist::read::read(&map, file, &mut d);
+    let netlist = bondspice::netlist::read::read(
+        &mut map,
+        file,
+        &bondspice::netlist::read::How::default(),
+        &mut d,
+    );
     assert!(d.is_empty(), "{d:?}\n{text}");
     netlist
 }

@@ -450,7 +450,13 @@ fn every_wrong_text_is_refused() {
         let file = deck.map.add("given.cir", deck.lines.join("\n") + "\n");
         let question = Question { netlist: Some(file), ..Question::default() };
         let mut d = vec![];
-        let found = pipeline::certificate(&mut deck.map, &deck.model, &question, &mut d);
+        let found = pipeline::certificate(
+            &mut deck.map,
+            &deck.model,
+            &question,
+            &Default::default(),
+            &mut d,
+        );
         assert!(found.is_some_and(|(found, _)| found.holds()), "{}: {d:#?}", deck.name);
     }
     let mut random = Random(SEED);
@@ -470,7 +476,13 @@ fn every_wrong_text_is_refused() {
             let file = deck.map.add("given.cir", lines.join("\n") + "\n");
             let question = Question { netlist: Some(file), ..Question::default() };
             let mut d = vec![];
-            let found = pipeline::certificate(&mut deck.map, &deck.model, &question, &mut d);
+            let found = pipeline::certificate(
+                &mut deck.map,
+                &deck.model,
+                &question,
+                &Default::default(),
+                &mut d,
+            );
             let holds = found.is_some_and(|(certificate, _)| certificate.holds());
             let told = || format!("{sort}, {}: `{before}` became {:?}", deck.name, change.by);
             match (change.same, holds) {

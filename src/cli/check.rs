@@ -1,6 +1,6 @@
 //! `bondspice check MODEL.bg`: all that can be said about a source without running it.
 
-use super::flags::ModelFlags;
+use super::flags::{DeckFlags, ModelFlags};
 use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session};
@@ -21,6 +21,8 @@ pub struct Arguments {
     file: String,
     #[command(flatten)]
     model: ModelFlags,
+    #[command(flatten)]
+    deck: DeckFlags,
     /// What else than errors ends with exit code 1
     #[arg(long, value_name = "WHAT", value_parser = ["warnings"])]
     deny: Option<String>,
@@ -37,7 +39,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 }
 
 fn check(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
-    let overrides = arguments.model.overrides(session)?;
+    let mut overrides = arguments.model.overrides(session)?;
+    arguments.deck.add_to(&mut overrides, session)?;
     if arguments.fix {
         mend(&arguments.file, &overrides, session)?;
     }

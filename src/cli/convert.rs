@@ -1,13 +1,13 @@
 //! `bondspice convert MODEL.bg`: the netlist, and the map of its variables.
 
 use super::emit::Stage;
-use super::flags::ModelFlags;
+use super::flags::{DeckFlags, ModelFlags};
 use super::output::write_text;
 use super::pipeline;
 use super::session::{Exit, Session, same_file};
 use crate::bond::scale;
 use crate::diagnostic::Diagnostic;
-use crate::netlist::dialects::{self, DIALECTS};
+use crate::netlist::dialects;
 use crate::quantity::nearest;
 use crate::source::Span;
 use crate::translate::map::MapCard;
@@ -27,6 +27,8 @@ pub struct Arguments {
     file: String,
     #[command(flatten)]
     model: ModelFlags,
+    #[command(flatten)]
+    deck: DeckFlags,
     /// Where to write the netlist
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
@@ -54,7 +56,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 }
 
 fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
-    let Some(dialect) = dialects::find(&arguments.to) else {
+    let dialect = dialects::find(&arguments.to).filter(|dialect| dialect.text.is_some());
+    let Some(dialect) = dialect else {
         return Err(session.fail(unknown(&arguments.to)));
     };
     if arguments.emit.is_none() && one_output(arguments) {
@@ -63,6 +66,7 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         return Err(session.fail(error.help("give -o and --map two names")));
     }
     let mut overrides = arguments.model.overrides(session)?;
+    arguments.deck.add_to(&mut overrides, session)?;
     if let Some(scales) = &arguments.scale {
         overrides.scale = scale::parse(scales).map_err(|error| session.fail(*error))?;
     }
@@ -103,7 +107,7 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
 
 /// What is said of a simulator that has no row.
 fn unknown(name: &str) -> Diagnostic {
-    let names = || DIALECTS.iter().map(|dialect| dialect.name);
+    let names = dialects::written_names;
     let error = Diagnostic::error("E0943", Span::NONE, format!("no simulator is called `{name}`"));
     match nearest(&name.to_lowercase(), names()) {
         Some(meant) => error.help(format!("did you mean `{meant}`?")),

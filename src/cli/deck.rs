@@ -4,16 +4,22 @@ use crate::bond::elaborate::Overrides;
 use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::expr;
+use crate::netlist::dialects::Dialect;
 use crate::netlist::{Card, CardKind, Expr, Leaf, Names, Netlist, read};
 use crate::source::loader::edit_distance;
 use crate::source::{SourceMap, Span};
 
 /// Reads a few cards that stand on the command line; errors are told without a place.
-fn cards(text: &str, flag: &str, d: &mut Vec<Diagnostic>) -> Option<Netlist> {
+fn cards(
+    text: &str,
+    flag: &str,
+    dialect: &'static Dialect,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Netlist> {
     let mut map = SourceMap::default();
     let file = map.add("<command line>", format!("command line\n{text}\n.end\n"));
     let mut found = vec![];
-    let netlist = read::read(&map, file, &mut found);
+    let netlist = read::read(&mut map, file, &read::How::of(dialect), &mut found);
     let error = found.into_iter().find(|d| d.severity == Severity::Error);
     match error {
         None => Some(netlist),
@@ -44,7 +50,10 @@ fn adopt(expr: &Expr, from: &Names, to: &mut Names) -> Expr {
 pub fn set_parameters(netlist: &mut Netlist, set: &[(String, String)], d: &mut Vec<Diagnostic>) {
     for (name, value) in set {
         let value = value.replace(' ', "");
-        let Some(read) = cards(&format!(".param {name}={value}"), "--set", d) else { continue };
+        let Some(read) = cards(&format!(".param {name}={value}"), "--set", netlist.dialect, d)
+        else {
+            continue;
+        };
         let parameters = read.cards.iter().find_map(|card| match &card.kind {
             CardKind::Parameters(parameters) => parameters.first(),
             _ => None,
@@ -87,7 +96,8 @@ pub fn observe(netlist: &mut Netlist, list: Option<&str>, d: &mut Vec<Diagnostic
     if list.trim() != "all" {
         for (text, name) in items_of(list) {
             let text = text.replace(' ', "");
-            let Some(read) = cards(&format!(".print tran {text}"), "--observe", d) else {
+            let Some(read) = cards(&format!(".print tran {text}"), "--observe", netlist.dialect, d)
+            else {
                 continue;
             };
             let saved = read.cards.iter().find_map(|card| match &card.kind {
@@ -154,7 +164,7 @@ pub fn set_times(circuit: &mut Circuit, overrides: &Overrides, d: &mut Vec<Diagn
 /// A time as a netlist writes it, `20ms` or `20 ms`.
 fn time(text: &str, flag: &str, d: &mut Vec<Diagnostic>) -> Option<f64> {
     let packed = text.replace(' ', "");
-    let read = cards(&format!(".param time_={packed}"), flag, d)?;
+    let read = cards(&format!(".param time_={packed}"), flag, Default::default(), d)?;
     let value = read.cards.iter().find_map(|card| match &card.kind {
         CardKind::Parameters(parameters) => parameters.first()?.1.constant(),
         _ => None,

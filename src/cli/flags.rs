@@ -3,6 +3,9 @@
 use super::session::{Exit, Session};
 use crate::bond::elaborate::Overrides;
 use crate::diagnostic::Diagnostic;
+use crate::netlist::dialects::{self, Dialect};
+use crate::netlist::read::How;
+use crate::quantity::nearest;
 use crate::source::Span;
 
 /// What the command line says instead of the file.
@@ -29,6 +32,56 @@ pub struct ModelFlags {
     /// A folder in which imports are looked for, after that of the file that imports (repeatable)
     #[arg(short = 'I', value_name = "DIR")]
     pub include: Vec<String>,
+}
+
+/// How a netlist is read.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct DeckFlags {
+    /// The dialect of a netlist: ngspice, xyce, ltspice, spice; without it guessed from what the text says
+    #[arg(long, value_name = "DIALECT")]
+    pub dialect: Option<String>,
+    /// Read no file outside of this folder that a netlist names (.include, .lib, tables)
+    #[arg(long, value_name = "DIR")]
+    pub confine: Option<String>,
+}
+
+impl DeckFlags {
+    /// Adds the flags to those of a model.
+    ///
+    /// # Errors
+    /// The exit code, when what is wrong has been said.
+    pub fn add_to(&self, overrides: &mut Overrides, session: &mut Session) -> Result<(), Exit> {
+        if let Some(name) = &self.dialect {
+            dialect(name).map_err(|error| session.fail(*error))?;
+        }
+        overrides.dialect = self.dialect.clone();
+        overrides.confine = self.confine.clone();
+        Ok(())
+    }
+}
+
+/// The dialect of a name that netlists are read in.
+fn dialect(name: &str) -> Result<&'static Dialect, Box<Diagnostic>> {
+    let found = dialects::find(name).filter(|dialect| dialect.read.is_some());
+    found.ok_or_else(|| {
+        let message = format!("netlists in the dialect `{name}` are not read");
+        let error = Diagnostic::error("E0943", Span::NONE, message);
+        Box::new(match nearest(&name.to_lowercase(), dialects::read_names()) {
+            Some(meant) => error.help(format!("did you mean `{meant}`?")),
+            None => {
+                let names: Vec<&str> = dialects::read_names().collect();
+                error.help(format!("known: {}", names.join(", ")))
+            }
+        })
+    })
+}
+
+/// How a netlist is to be read, by the flags.
+pub fn how(overrides: &Overrides) -> How {
+    How {
+        dialect: overrides.dialect.as_deref().and_then(dialects::find),
+        confine: overrides.confine.clone(),
+    }
 }
 
 /// Flags of a command that reads a model and writes a result as text or JSON.
@@ -61,7 +114,7 @@ impl ModelFlags {
             step: self.step.clone(),
             options: pairs("--option", &self.option, session)?,
             folders: self.include.clone(),
-            scale: vec![],
+            ..Overrides::default()
         })
     }
 }

@@ -1,6 +1,7 @@
 //! The river as plain functions: from a text to a graph, a circuit, a run. The commands, and tests, are made of these.
 
 use super::emit::{self, Stage};
+use super::flags::how;
 use super::session::{Exit, Session};
 use crate::bond::causality::{self, Causality};
 use crate::bond::elaborate::{self, Overrides};
@@ -12,6 +13,7 @@ use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::netlist::header::Header;
+use crate::netlist::read::How;
 use crate::netlist::{Netlist, flatten, read, write};
 use crate::quantity::{did_you_mean, nearest};
 use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
@@ -210,7 +212,7 @@ pub fn circuit(
     match language(map, file) {
         Language::Bond => model(map, file, overrides, d)?.circuit(d),
         Language::Netlist => {
-            let mut netlist = read::read(map, file, d);
+            let mut netlist = read::read(map, file, &how(overrides), d);
             if has_errors(d) {
                 return None;
             }
@@ -433,7 +435,7 @@ pub fn emit(
         }),
         Stage::Netlist if bond => model(map, file, overrides, &mut d)
             .map(|model| write::write(&model.translation.netlist)),
-        Stage::Netlist => Some(write::write(&read::read(map, file, &mut d))),
+        Stage::Netlist => Some(write::write(&read::read(map, file, &how(overrides), &mut d))),
         Stage::Circuit => {
             circuit(map, file, overrides, &mut d).map(|(circuit, _)| emit::circuit(&circuit))
         }
@@ -480,7 +482,8 @@ pub fn verify(
         return Ok(None);
     }
     let Some(model) = model(map, file, overrides, d) else { return Ok(None) };
-    let Some((certificate, netlist)) = certificate(map, &model, question, d) else {
+    let Some((certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
+    else {
         return Ok(None);
     };
     if !certificate.holds() || model.graph.experiment.until.is_none() {
@@ -514,6 +517,7 @@ pub fn certificate(
     map: &mut SourceMap,
     model: &Model,
     question: &Question,
+    how: &How,
     d: &mut Vec<Diagnostic>,
 ) -> Option<(verify::Certificate, Netlist)> {
     let text = match question.netlist {
@@ -523,7 +527,7 @@ pub fn certificate(
             map.add(format!("{}.cir", model.graph.name), text)
         }
     };
-    let netlist = read::read(map, text, d);
+    let netlist = read::read(map, text, how, d);
     if has_errors(d) {
         return None;
     }

@@ -1,7 +1,7 @@
 //! `bondspice simulate FILE`: runs a bond graph or a netlist.
 
 use super::emit::Stage;
-use super::flags::ModelFlags;
+use super::flags::{DeckFlags, ModelFlags};
 use super::list;
 use super::output::{Output, write_text};
 use super::pipeline::{self, Pick, Run};
@@ -45,9 +45,8 @@ pub struct Arguments {
     /// Which analysis of a netlist to run; without it the last
     #[arg(long, value_enum, value_name = "KIND")]
     analysis: Option<Pick>,
-    /// The dialect of a netlist: ngspice
-    #[arg(long, value_name = "DIALECT", default_value = "ngspice")]
-    dialect: String,
+    #[command(flatten)]
+    deck: DeckFlags,
     /// Print a stage on the way instead of running
     #[arg(long, value_enum, value_name = "STAGE")]
     emit: Option<Stage>,
@@ -67,12 +66,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 }
 
 fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
-    if !arguments.dialect.eq_ignore_ascii_case("ngspice") {
-        let message = format!("netlists in the dialect `{}` cannot be read yet", arguments.dialect);
-        let diagnostic = Diagnostic::error("E0943", Span::NONE, message);
-        return Err(session.fail(diagnostic.because("known: ngspice")));
-    }
-    let overrides = arguments.model.overrides(session)?;
+    let mut overrides = arguments.model.overrides(session)?;
+    arguments.deck.add_to(&mut overrides, session)?;
     let file = session.load(&arguments.file)?;
     if let Some(stage) = arguments.emit {
         let text = pipeline::emit(session, file, &overrides, stage)?;

@@ -4,6 +4,7 @@ use super::output::Output;
 use super::session::{Exit, Session};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Expr;
+use crate::netlist::read::How;
 use crate::netlist::{self, CardKind, Element, Leaf, Netlist};
 use crate::source::{SourceMap, Span};
 use crate::trace::formats::Heading;
@@ -164,7 +165,7 @@ fn expressions(map: &Map) -> (Netlist, Vec<Option<usize>>) {
     }
     let mut sources = SourceMap::default();
     let file = sources.add("<map>", text + ".end\n");
-    let netlist = netlist::read::read(&sources, file, &mut vec![]);
+    let netlist = netlist::read::read(&mut sources, file, &How::default(), &mut vec![]);
     let place = |at: usize| {
         let name = netlist.names.find(&format!("b_{at}"))?;
         let is = |kind: &CardKind| matches!(kind, CardKind::Device(device) if device.name == name);

@@ -1,7 +1,7 @@
 //! `bondspice verify MODEL.bg`: the certificate of a netlist's text, the circuit's run against the bond graph's own
 //! equations, and the balance of energy.
 
-use super::flags::ReportFlags;
+use super::flags::{DeckFlags, ReportFlags};
 use super::output::write_text;
 use super::pipeline::{self, Question};
 use super::session::{Exit, Session};
@@ -29,9 +29,8 @@ pub struct Arguments {
     /// A netlist to check instead of the bond graph's own
     #[arg(long, value_name = "FILE")]
     netlist: Option<String>,
-    /// The dialect of that netlist: ngspice
-    #[arg(long, value_name = "DIALECT", value_parser = ["ngspice"], default_value = "ngspice")]
-    dialect: String,
+    #[command(flatten)]
+    deck: DeckFlags,
     /// The map of that netlist, as `convert --map` writes it; the bond graph's own map without it
     #[arg(long, value_name = "FILE", requires = "netlist")]
     map: Option<String>,
@@ -49,7 +48,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
 
 fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
     let flags = &arguments.report;
-    let overrides = flags.model.overrides(session)?;
+    let mut overrides = flags.model.overrides(session)?;
+    arguments.deck.add_to(&mut overrides, session)?;
     let file = session.load(&flags.file)?;
     let netlist = arguments.netlist.as_deref().map(|path| session.load(path)).transpose()?;
     let map = match arguments.map.as_deref() {

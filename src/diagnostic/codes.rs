@@ -186,6 +186,7 @@ pub const CODES: &[Code] = &[
     row("W0703", "card is skipped", "The card asks for something that is not computed, but says nothing of the circuit, so the run goes on without it."),
     row("W0730", "header line is not understood", "A comment `*bondspice key=value` is malformed and has no effect. The keys stand in the header of `netlist/header.rs`."),
     row("W0731", "node is named only once", "Nothing else stands at the node, and nothing reads it: mostly a slip of the pen, and the current into it is 0."),
+    row("N0719", "dialect guessed", "Nobody said what simulator the netlist is written for, and a line of it is understood by one alone, so it is read as that one reads it: suffixes, functions, signs and names differ. `--dialect` says it."),
     // -- 08: simulation
     row("E0801", "no operating point or start", "Newton's method found no values that satisfy all equations, neither directly, nor with conductances at the nodes that are taken away step by step, nor with sources turned up step by step. The message names the equation that is satisfied worst."),
     row("E0802", "step too small", "The step became smaller than rounding allows without reaching the tolerance. A law may have a jump or a pole there, or the solution ends. The message names the equation that is satisfied worst, and why steps were cut."),
@@ -221,7 +222,7 @@ pub const CODES: &[Code] = &[
     row("E0940", "wrong use of a flag", "The message says which flag and what it takes; `--help` shows an example."),
     row("E0941", "unknown format", "The format of a result follows from --format, else from the ending of -o: csv, raw, json."),
     row("E0942", "nothing to compare", "No signal of the reference has a column in the trace. Pair names that differ with --signals."),
-    row("E0943", "simulator or dialect that is not known yet", "Netlists are written for the simulators that `bondspice convert --help` lists."),
+    row("E0943", "simulator or dialect that is not known", "Netlists are written for the simulators that `bondspice convert --help` lists, and read in the dialects that `bondspice simulate --help` lists."),
     row("E0944", "flag that does not fit the input", "Netlists have parameters and columns but no inputs, graph or causality; bond graphs have all of them."),
     row("E0945", "two columns of one name", "The headers of a result must differ. Give one of the columns another name with `as`."),
     row("E0948", "no such example", "`bondspice examples` lists the models that come with the program; a name stands with its folder, as in `textbook/A1`."),

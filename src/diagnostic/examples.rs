@@ -156,6 +156,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "W0703" "commands_skipped.cir"
     "W0730" "header_malformed.cir"
     "W0731" "node_named_once.cir"
+    "N0719" "dialect_guessed.cir"
     "E0801" "no_operating_point.cir"
     "E0802" "blows_up.cir"
     "E0803" "root_of_a_negative.cir"

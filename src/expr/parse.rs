@@ -7,8 +7,8 @@
 //! impl Language for Netlist<'_> {
 //!     type Rule = Rule;
 //!     type Leaf = netlist::Leaf;
-//!     const DIALECT: Dialect = Dialect::Ngspice;
 //!     expr::roles!(Rule);
+//!     fn dialect(&self) -> Dialect { Dialect::Ngspice }
 //!     fn span(&self, span: pest::Span<'_>) -> Span { Span::new(self.file, span.start() + self.offset, …) }
 //!     fn atom(&mut self, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr<Leaf>> { … }
 //!     fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr<Leaf>> { … }
@@ -67,8 +67,8 @@ pub trait Language {
     type Rule: RuleType;
     /// Its leaves.
     type Leaf: Clone;
-    /// Its names of functions, and what its `^` means.
-    const DIALECT: Dialect;
+    /// Whose names of functions it has, and whose meaning of `^`.
+    fn dialect(&self) -> Dialect;
     /// What a rule is; written by [`roles!`](crate::expr::roles).
     fn role(rule: Self::Rule) -> Role;
     /// Where a piece of the parsed text stands.
@@ -202,7 +202,7 @@ fn convert<L: Language>(
     let mut failed = false;
     let mut branches = vec![];
     let mut stack =
-        Stack { dialect: L::DIALECT, operands: vec![], operators: vec![], diagnostics: d };
+        Stack { dialect: language.dialect(), operands: vec![], operators: vec![], diagnostics: d };
     let (mut after_operand, mut branching) = (false, false);
     for part in pair.into_inner() {
         let span = language.span(part.as_span());
@@ -293,7 +293,7 @@ fn call<L: Language>(
     let span = language.span(pair.as_span());
     let mut inner = pair.clone().into_inner();
     let name = inner.next()?.as_str().trim_end();
-    let Some(meaning) = functions::find(L::DIALECT, name) else {
+    let Some(meaning) = functions::find(language.dialect(), name) else {
         return language.call(name, pair.clone(), d).map(measured);
     };
     let (mut arguments, mut strange) = (vec![], false);

@@ -67,8 +67,10 @@ macro_rules! toy {
         impl Language for $toy {
             type Rule = $rule;
             type Leaf = String;
-            const DIALECT: Dialect = $dialect;
             roles!($rules);
+            fn dialect(&self) -> Dialect {
+                $dialect
+            }
             fn span(&self, span: pest::Span<'_>) -> Span {
                 Span::new(FileId(0), span.start(), span.end())
             }

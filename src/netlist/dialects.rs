@@ -4,10 +4,9 @@
 //! there are any (`adapt`), else it is an error that names the element.
 
 use super::adapt::{self, Adapted};
-use super::{Netlist, mast, read, write};
+use super::{Netlist, mast, write};
 use crate::diagnostic::Diagnostic;
 use crate::expr;
-use crate::source::{FileId, SourceMap};
 
 /// One row of the table.
 pub struct Dialect {
@@ -34,14 +33,40 @@ pub struct Dialect {
     pub switches: Switches,
     /// What it cannot say.
     pub lacks: &'static [adapt::Lack],
-    /// Writes a netlist that has been put in its words. `None`, with errors, for what has none after all.
-    pub text: fn(&Netlist, &Dialect, &mut Vec<Diagnostic>) -> Option<String>,
-    /// Reads it, where there is a reader.
-    pub read: Option<Read>,
+    /// Writes a netlist that has been put in its words, where that is done. `None`, with errors, for what has none after all.
+    pub text: Option<Write>,
+    /// How it is read, where it is.
+    pub read: Option<Reading>,
 }
 
-/// Reads the netlist of a file.
-pub type Read = fn(&SourceMap, FileId, &mut Vec<Diagnostic>) -> Netlist;
+/// Writes a netlist as text.
+pub type Write = fn(&Netlist, &Dialect, &mut Vec<Diagnostic>) -> Option<String>;
+
+/// What differs from one dialect to the next in reading.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Suffixes of numbers besides `t g meg k mil m u n p f`.
+    pub numbers: Numbers,
+    /// What begins a comment at the end of a line.
+    pub comments: &'static [&'static str],
+    /// Names of the ground.
+    pub grounds: &'static [&'static str],
+    /// Whether `a:b` in an expression is one name, of something within an instance or a device.
+    pub colons: bool,
+    /// Whether `ic=` of a device holds in the operating point, too.
+    pub initial_holds: bool,
+}
+
+/// What numbers may end with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Numbers {
+    /// `a` is 1e-18; else it is a letter without meaning.
+    pub atto: bool,
+    /// `x` is 1e6.
+    pub x_is_mega: bool,
+    /// `4k7` is 4700; else what follows the suffix has no meaning.
+    pub digits_behind: bool,
+}
 
 /// Where the comment of a card may stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,8 +99,20 @@ pub const NGSPICE: Dialect = Dialect {
     phases: true,
     switches: Switches::Threshold,
     lacks: &[],
-    text: |netlist, dialect, _| Some(write::text(netlist, dialect)),
-    read: Some(read::read),
+    text: Some(|netlist, dialect, _| Some(write::text(netlist, dialect))),
+    read: Some(Reading {
+        numbers: Numbers { atto: true, x_is_mega: false, digits_behind: false },
+        comments: &[";", "$", "//"],
+        grounds: &["0", "gnd"],
+        colons: false,
+        initial_holds: false,
+    }),
+};
+
+/// How ngspice and what is written as for it is read.
+const READING: Reading = match NGSPICE.read {
+    Some(reading) => reading,
+    None => unreachable!(),
 };
 
 /// Every dialect.
@@ -94,6 +131,13 @@ pub const DIALECTS: &[Dialect] = &[
         linked_to_any: false,
         switches: Switches::Smooth,
         lacks: &[adapt::CHARGED_LINE, adapt::SWITCHING_HYSTERESIS],
+        read: Some(Reading {
+            numbers: Numbers { atto: false, x_is_mega: true, digits_behind: false },
+            comments: &[";"],
+            grounds: &["0"],
+            colons: true,
+            initial_holds: true,
+        }),
         ..NGSPICE
     },
     Dialect {
@@ -105,6 +149,12 @@ pub const DIALECTS: &[Dialect] = &[
         options: (None, &["numdgt=15", "plotwinsize=0"]),
         linked_to_any: false,
         lacks: &[adapt::CHARGED_LINE],
+        read: Some(Reading {
+            numbers: Numbers { atto: false, x_is_mega: false, digits_behind: true },
+            comments: &[";"],
+            colons: true,
+            ..READING
+        }),
         ..NGSPICE
     },
     Dialect {
@@ -124,17 +174,47 @@ pub const DIALECTS: &[Dialect] = &[
         name: "saber",
         about: "Saber MAST, own templates only, by public notes on the language; untested",
         lacks: mast::LACKS,
-        text: mast::text,
+        text: Some(mast::text),
         read: None,
+        ..NGSPICE
+    },
+    Dialect {
+        name: "spice",
+        about: "SPICE 3 and its kin: read only",
+        text: None,
+        read: Some(Reading {
+            numbers: Numbers { atto: false, x_is_mega: false, digits_behind: false },
+            comments: &[";", "$"],
+            ..READING
+        }),
         ..NGSPICE
     },
 ];
 
+impl std::fmt::Debug for Dialect {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl Default for &'static Dialect {
+    /// What a netlist is in that says nothing else.
+    fn default() -> Self {
+        &DIALECTS[0]
+    }
+}
+
 impl Dialect {
+    /// How it is read; as ngspice where it has no reader.
+    pub fn reading(&self) -> Reading {
+        self.read.unwrap_or(READING)
+    }
+
     /// The netlist in the words of the dialect, and its text. `None`, with an error for each card that it cannot say.
     pub fn write(&self, netlist: &Netlist, d: &mut Vec<Diagnostic>) -> Option<Written> {
+        let text = self.text?;
         let Adapted { netlist, senses } = adapt::adapt(netlist, self, d)?;
-        Some(Written { text: (self.text)(&netlist, self, d)?, senses, netlist })
+        Some(Written { text: text(&netlist, self, d)?, senses, netlist })
     }
 }
 
@@ -148,6 +228,16 @@ pub struct Written {
     pub senses: Vec<(String, String)>,
 }
 
+/// The names of the dialects that are read.
+pub fn read_names() -> impl Iterator<Item = &'static str> {
+    DIALECTS.iter().filter(|dialect| dialect.read.is_some()).map(|dialect| dialect.name)
+}
+
+/// The names of the dialects that are written.
+pub fn written_names() -> impl Iterator<Item = &'static str> {
+    DIALECTS.iter().filter(|dialect| dialect.text.is_some()).map(|dialect| dialect.name)
+}
+
 /// The dialect of a name.
 pub fn find(name: &str) -> Option<&'static Dialect> {
     DIALECTS.iter().find(|dialect| dialect.name.eq_ignore_ascii_case(name))
@@ -156,18 +246,21 @@ pub fn find(name: &str) -> Option<&'static Dialect> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::read::{How, read};
+    use crate::source::SourceMap;
 
     #[test]
     fn every_dialect_reads_what_it_writes() {
         for dialect in DIALECTS {
-            let Some(read) = dialect.read else { continue };
+            let (Some(_), Some(_)) = (dialect.read, dialect.text) else { continue };
+            let how = How::of(dialect);
             let mut map = SourceMap::default();
             let file = map.add("deck.cir", "a title\nr1 a 0 1000\nv1 a 0 5\n.op\n.end\n");
             let mut d = vec![];
             let write = |netlist: &Netlist| dialect.write(netlist, &mut vec![]).unwrap().text;
-            let text = write(&read(&map, file, &mut d));
+            let text = write(&read(&mut map, file, &how, &mut d));
             let file = map.add("again.cir", text.clone());
-            assert_eq!(write(&read(&map, file, &mut d)), text);
+            assert_eq!(write(&read(&mut map, file, &how, &mut d)), text);
             assert!(d.is_empty() && find(&dialect.name.to_uppercase()).is_some(), "{d:?}");
         }
         assert!(find("nosuch").is_none());

@@ -220,6 +220,8 @@ pub enum Shape {
 /// A netlist.
 #[derive(Clone, Debug, Default)]
 pub struct Netlist {
+    /// What it is written in, or was read as.
+    pub dialect: &'static dialects::Dialect,
     /// The first line.
     pub title: String,
     /// Its names.

@@ -39,11 +39,6 @@ impl Names {
         }
     }
 
-    /// The name of a node: `gnd` is the ground, `0`.
-    pub fn node(&mut self, text: &str) -> Name {
-        if text.eq_ignore_ascii_case("gnd") { self.intern("0") } else { self.intern(text) }
-    }
-
     /// The name of a text that has been seen before.
     pub fn find(&self, text: &str) -> Option<Name> {
         if self.slots.is_empty() { None } else { self.slot(text, hash(text)).ok() }

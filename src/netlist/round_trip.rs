@@ -3,7 +3,12 @@
 use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Source, Waveform};
 use crate::circuit::{self, Circuit, DeviceKind};
 use crate::expr::{Binary, Function, Node};
-use crate::netlist::{Leaf, flatten::flatten, read::read, write::write};
+use crate::netlist::{
+    Leaf,
+    flatten::flatten,
+    read::{How, read},
+    write::write,
+};
 use crate::source::{SourceMap, Span};
 use proptest::prelude::*;
 
@@ -11,7 +16,7 @@ fn again(text: &str) -> Netlist {
     let mut map = SourceMap::default();
     let file = map.add("again.cir", text);
     let mut d = vec![];
-    let netlist = read(&map, file, &mut d);
+    let netlist = read(&mut map, file, &How::default(), &mut d);
     assert!(d.is_empty(), "{d:?}\n{text}");
     netlist
 }
@@ -120,7 +125,13 @@ fn sample(values: &[f64], law: u64) -> Netlist {
     let element = Element::BehaviouralCurrent { law };
     let kind = CardKind::Device(Device { name, nodes: vec![a, ground], element });
     cards.push(Card { kind, span: Span::NONE, comment: None });
-    Netlist { title: "a sample".into(), names, header: vec![("hmax".into(), "auto".into())], cards }
+    Netlist {
+        title: "a sample".into(),
+        names,
+        header: vec![("hmax".into(), "auto".into())],
+        cards,
+        ..Netlist::default()
+    }
 }
 
 /// Some expression, by the digits of a number.

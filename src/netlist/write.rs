@@ -387,6 +387,7 @@ mod tests {
                 },
             ],
             names,
+            ..Netlist::default()
         }
     }
 

@@ -5,6 +5,7 @@ use super::names::Renamed;
 use super::values::Speaker;
 use crate::bond::graph::{self, BondId, Law, Power, SignalOrigin, Storage};
 use crate::expr::{Binary, Node, Unary};
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::read::expression::expression as expression_of;
 use crate::netlist::write::expression;
 use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
@@ -191,7 +192,7 @@ impl Map {
             |value: &serde_json::Value, key: &str| Some(value.get(key)?.as_str()?.to_string());
         let variables = json.get("variables")?.as_array()?.iter().map(|variable| {
             let written = text(variable, "expr")?;
-            let read = expression_of(&written, names, FileId(u32::MAX), 0, &mut vec![]);
+            let read = expression_of(&written, names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
             let unit = text(variable, "unit")?;
             Some(Variable {
                 bg: text(variable, "bg")?,

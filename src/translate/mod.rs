@@ -120,6 +120,7 @@ pub fn translate(
         names: builder.namer.names,
         header: header.pairs(),
         cards: builder.cards,
+        ..Netlist::default()
     };
     Some(Translation { netlist, map, figures })
 }

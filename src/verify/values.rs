@@ -9,6 +9,7 @@ use crate::bond::equations::{Known, equations};
 use crate::bond::graph::{BondGraph, Expr, Leaf, Memory, SignalId, SignalLaw};
 use crate::bond::initial::InitialState;
 use crate::circuit::{DeviceKind, NodeId, Waveform};
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::flatten::scope::{self, TOP};
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
@@ -380,7 +381,8 @@ impl Check<'_> {
         }
         let mut told = HashSet::new();
         for column in &text.header.columns {
-            let read = expression(&column.expr, &mut names, FileId(u32::MAX), 0, &mut vec![]);
+            let read =
+                expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
             let Some(read) = read else { continue };
             let mut wanted = vec![];
             read.leaves(&mut |leaf, _| match leaf {

@@ -68,6 +68,10 @@ pub struct Overrides {
     pub options: Vec<(String, String)>,
     /// `-I`: folders in which imports are looked for.
     pub folders: Vec<String>,
+    /// `--dialect`: that of a netlist; guessed where none is said.
+    pub dialect: Option<String>,
+    /// `--confine`: the folder outside of which no file is read that a netlist names.
+    pub confine: Option<String>,
     /// `--scale`: domains and their factors, later ones winning; applied to the elaborated graph.
     pub scale: Vec<(crate::quantity::Domain, f64)>,
 }

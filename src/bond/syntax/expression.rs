@@ -272,9 +272,12 @@ pub fn unit(text: &str, span: Span, d: &mut Vec<Diagnostic>) -> Option<Unit> {
 impl Language for Reader<'_> {
     type Rule = Rule;
     type Leaf = Leaf;
-    const DIALECT: Dialect = Dialect::Bond;
 
     crate::expr::roles!(Rule);
+
+    fn dialect(&self) -> Dialect {
+        Dialect::Bond
+    }
 
     fn span(&self, span: pest::Span<'_>) -> Span {
         let end = span.start() + span.as_str().trim_end_matches([' ', '\n']).len();

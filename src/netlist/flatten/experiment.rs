@@ -6,6 +6,7 @@ use super::scope::{self, TOP};
 use super::values::Lookup;
 use crate::circuit::{Analysis, Circuit, NodeId, Output};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
 use crate::netlist::{CardKind, Expr};
@@ -95,7 +96,7 @@ fn columns(flat: &Flat, header: &Header, outputs: &mut Vec<Output>, d: &mut Vec<
     let mut read = vec![];
     for column in &header.columns {
         let mut found = vec![];
-        let expr = expression(&column.expr, &mut names, FileId(u32::MAX), 0, &mut found);
+        let expr = expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut found);
         let expr = expr.map(|expr| expr.map(&mut |leaf, _| Expr::leaf(leaf.clone())));
         complain(&column.name, found, d);
         read.push((column, expr));

@@ -3,14 +3,14 @@
 use crate::circuit::stamps::{Stamps, stamp};
 use crate::circuit::{Analysis, Circuit, DeviceId, DeviceKind, Leaf, NodeId, Waveform};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::read::read;
+use crate::netlist::read::{How, read};
 use crate::source::SourceMap;
 
 fn flat(text: &str) -> (Option<Circuit>, Vec<Diagnostic>) {
     let mut map = SourceMap::default();
     let file = map.add("deck.cir", text);
     let mut d = vec![];
-    let netlist = read(&map, file, &mut d);
+    let netlist = read(&mut map, file, &How::default(), &mut d);
     assert!(d.is_empty(), "{d:?}");
     (super::flatten(&netlist, &mut d), d)
 }

@@ -28,6 +28,7 @@ const RESULT: &str = "it only asks for a result that is not computed here";
 pub const CARDS: &[(&str, Treatment)] = &[
     ("param", Read(parameters)),
     ("params", Read(parameters)),
+    ("global_param", Read(parameters)),
     ("model", Read(model)),
     ("options", Read(options)),
     ("option", Read(options)),
@@ -111,7 +112,7 @@ pub fn subcircuit(reader: &mut Reader, cursor: &mut Cursor) -> Option<Subcircuit
         if word.is_empty() || word.eq_ignore_ascii_case("params:") {
             break;
         }
-        ports.push(reader.names.node(word));
+        ports.push(reader.node_name(word));
     }
     let mut parameters = vec![];
     while let Some(key) = cursor.key() {
@@ -230,7 +231,7 @@ fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
                 reader.missing(cursor, "the value of the option");
                 return None;
             }
-            let value = match super::number::number(word) {
+            let value = match super::number::number(word, reader.reading.numbers) {
                 Some(number) if number.end == word.len() => {
                     let span = cursor.span(reader, from, from + word.len());
                     reader.diagnostics.extend(super::suffix_warning(word, &number, span));
@@ -365,7 +366,7 @@ fn item(
     if text.starts_with(|c: char| c.is_alphanumeric() || c == '_')
         && !text.contains(['(', ')', '{', '*', '/', ','])
     {
-        let leaf = Leaf::Voltage(reader.names.node(text), None);
+        let leaf = Leaf::Voltage(reader.node_name(text), None);
         return Some((format!("v({text})"), Expr::new(Node::Leaf(leaf), span)));
     }
     let expr = reader.grouped(cursor, from, to)?;

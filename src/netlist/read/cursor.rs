@@ -5,7 +5,7 @@
 use super::{Reader, number};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
-use crate::netlist::{Expr, Leaf, Name};
+use crate::netlist::{Expr, Leaf, Name, Names};
 use crate::source::Span;
 
 /// A place in a logical line.
@@ -133,6 +133,12 @@ impl<'l> Cursor<'l> {
     }
 }
 
+/// The name of a node; what is called the ground is `0`.
+pub fn node_name(names: &mut Names, grounds: &[&str], word: &str) -> Name {
+    let ground = grounds.iter().any(|ground| ground.eq_ignore_ascii_case(word));
+    names.intern(if ground { "0" } else { word })
+}
+
 impl Reader<'_> {
     /// A name at a place.
     pub fn name(&mut self, (word, _): (&str, usize)) -> Name {
@@ -146,7 +152,12 @@ impl Reader<'_> {
             self.missing(cursor, what);
             return None;
         }
-        Some(self.names.node(word))
+        Some(self.node_name(word))
+    }
+
+    /// The name of a node; what the dialect calls the ground is `0`.
+    pub fn node_name(&mut self, word: &str) -> Name {
+        node_name(&mut self.names, self.reading.grounds, word)
     }
 
     /// A value: a number, a name, `{expression}` or `'expression'`; an error when there is none.
@@ -193,7 +204,7 @@ impl Reader<'_> {
     /// A value that a word is.
     fn bare_value(&mut self, cursor: &mut Cursor, word: &str, from: usize) -> Option<Expr> {
         let span = cursor.span(self, from, from + word.len());
-        let Some(read) = number::number(word) else {
+        let Some(read) = number::number(word, self.reading.numbers) else {
             let plain =
                 word.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.' | '#' | '$'));
             if plain {
@@ -246,7 +257,7 @@ impl Reader<'_> {
         let text = &cursor.text[from..to];
         // The commonest expressions are one number.
         let trimmed = text.trim();
-        if let Some(read) = number::number(trimmed)
+        if let Some(read) = number::number(trimmed, self.reading.numbers)
             && read.letters == trimmed.len()
         {
             let start = from + text.len() - text.trim_start().len();
@@ -256,6 +267,7 @@ impl Reader<'_> {
         super::expression::expression(
             text,
             &mut self.names,
+            self.dialect,
             self.file,
             cursor.base + from,
             self.diagnostics,

@@ -427,7 +427,7 @@ fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> 
         return None;
     };
     for (word, _) in words {
-        nodes.push(reader.names.node(word));
+        nodes.push(reader.node_name(word));
     }
     let subcircuit = reader.name(subcircuit);
     let mut parameters = vec![];

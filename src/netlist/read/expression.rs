@@ -1,9 +1,11 @@
 //! Expressions of netlists, by the shared grammar with SPICE's leaves.
 
+use super::cursor::node_name;
 use super::number;
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
-use crate::expr::{self, Dialect, Node, Table};
+use crate::expr::{self, Node, Table};
+use crate::netlist::dialects::{Dialect, Reading};
 use crate::netlist::{Expr, Leaf, Names};
 use crate::source::{FileId, Span};
 use pest::Parser;
@@ -24,6 +26,7 @@ mod grammar {
 pub fn expression(
     text: &str,
     names: &mut Names,
+    dialect: &Dialect,
     file: FileId,
     offset: usize,
     d: &mut Vec<Diagnostic>,
@@ -40,7 +43,8 @@ pub fn expression(
             return None;
         }
     };
-    let mut language = Spice { names, file, offset };
+    let mut language =
+        Spice { names, spelling: dialect.spelling, reading: dialect.reading(), file, offset };
     parse::expression(&mut language, pairs.next()?, d)
 }
 
@@ -76,6 +80,8 @@ fn syntax_error(
 
 struct Spice<'a> {
     names: &'a mut Names,
+    spelling: expr::Dialect,
+    reading: Reading,
     file: FileId,
     offset: usize,
 }
@@ -83,8 +89,11 @@ struct Spice<'a> {
 impl Language for Spice<'_> {
     type Rule = Rule;
     type Leaf = Leaf;
-    const DIALECT: Dialect = Dialect::Ngspice;
     expr::roles!(Rule);
+
+    fn dialect(&self) -> expr::Dialect {
+        self.spelling
+    }
 
     fn span(&self, span: pest::Span<'_>) -> Span {
         Span::new(self.file, span.start() + self.offset, span.end() + self.offset)
@@ -95,7 +104,7 @@ impl Language for Spice<'_> {
         let node = match pair.as_rule() {
             Rule::number => {
                 let text = pair.as_str();
-                let read = number::number(text)?;
+                let read = number::number(text, self.reading.numbers)?;
                 d.extend(super::suffix_warning(text, &read, span));
                 Node::Number(read.value)
             }
@@ -118,8 +127,10 @@ impl Language for Spice<'_> {
                 if rule == Rule::current {
                     Node::Leaf(Leaf::Current(self.names.intern(first)))
                 } else {
-                    let first = self.names.node(first);
-                    let second = parts.next().map(|node| self.names.node(node.as_str()));
+                    let grounds = self.reading.grounds;
+                    let mut node = |word| node_name(self.names, grounds, word);
+                    let first = node(first);
+                    let second = parts.next().map(|part| node(part.as_str()));
                     Node::Leaf(Leaf::Voltage(first, second))
                 }
             }
@@ -211,10 +222,11 @@ fn extrapolated(mut table: Table) -> Table {
 mod tests {
     use super::*;
     use crate::expr::{Binary, Function};
+    use crate::netlist::dialects::NGSPICE;
 
     fn read(text: &str) -> (Option<Expr>, Names, Vec<Diagnostic>) {
         let (mut names, mut d) = (Names::default(), vec![]);
-        let expr = expression(text, &mut names, FileId(0), 0, &mut d);
+        let expr = expression(text, &mut names, &NGSPICE, FileId(0), 0, &mut d);
         (expr, names, d)
     }
 

@@ -23,12 +23,14 @@ pub struct Lines<'a> {
     at: usize,
     /// Lines that were found while looking for continuations, in reverse order.
     held: Vec<Line<'a>>,
+    /// What begins a comment at the end of a line.
+    marks: &'static [&'static str],
 }
 
 impl<'a> Lines<'a> {
-    /// The lines of `text` from byte `at` on.
-    pub fn new(text: &'a str, at: usize) -> Lines<'a> {
-        Lines { text, at, held: vec![] }
+    /// The lines of `text` from byte `at` on; `marks` are of `;`, `$`, `//`.
+    pub fn new(text: &'a str, at: usize, marks: &'static [&'static str]) -> Lines<'a> {
+        Lines { text, at, held: vec![], marks }
     }
 
     /// The next physical line: its start and its end, without the line end.
@@ -61,7 +63,7 @@ impl<'a> Iterator for Lines<'a> {
                 let text = Cow::Borrowed(content.trim_end());
                 return Some(Line { start: start + indent, text, comment: None });
             }
-            let (cut, comment) = split_comment(content);
+            let (cut, comment) = split_comment(content, self.marks);
             if content[..cut].trim().is_empty() {
                 // A line of `; …` or `$ …` alone is as good as one of `* …`.
                 continue;
@@ -96,7 +98,7 @@ impl<'a> Lines<'a> {
                 let text = Cow::Borrowed(content.trim_end());
                 between.push(Line { start: start + indent, text, comment: None });
             } else if let Some(continued) = content.strip_prefix('+') {
-                let (cut, comment) = split_comment(continued);
+                let (cut, comment) = split_comment(continued, self.marks);
                 let from = start + indent + 1;
                 let whole = line.text.to_mut();
                 whole.extend(std::iter::repeat_n(
@@ -126,7 +128,7 @@ impl<'a> Lines<'a> {
 
 /// Where the comment at the end of a line begins, and its text: `;`, `//`, or `$` after a blank or comma or at the
 /// beginning. A marker within double quotes is none.
-fn split_comment(line: &str) -> (usize, Option<String>) {
+fn split_comment(line: &str, marks: &[&str]) -> (usize, Option<String>) {
     let bytes = line.as_bytes();
     // Most lines hold none of the marks.
     if !bytes.iter().any(|b| matches!(b, b';' | b'$' | b'/')) {
@@ -144,7 +146,7 @@ fn split_comment(line: &str) -> (usize, Option<String>) {
             b'$' if at == 0 || matches!(bytes[at - 1], b' ' | b'\t' | b',') => 1,
             _ => 0,
         };
-        if marker > 0 && !quoted {
+        if marker > 0 && !quoted && marks.contains(&&line[at..at + marker]) {
             let text = line[at + marker..].trim();
             return (at, (!text.is_empty()).then(|| text.to_string()));
         }
@@ -157,7 +159,9 @@ mod tests {
     use super::*;
 
     fn lines(text: &str) -> Vec<(usize, String, Option<String>)> {
-        Lines::new(text, 0).map(|line| (line.start, line.text.into_owned(), line.comment)).collect()
+        Lines::new(text, 0, &[";", "$", "//"])
+            .map(|line| (line.start, line.text.into_owned(), line.comment))
+            .collect()
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! comments. What is not understood is an error at its place; nothing that belongs to the circuit is skipped silently.
 //! Expressions alone go through a grammar (grammar/spice.pest); plain numbers never do.
 
+pub mod guess;
 pub mod lines;
 pub mod number;
 pub mod cursor;
@@ -13,6 +14,7 @@ pub mod devices;
 pub mod cards;
 
 use crate::diagnostic::Diagnostic;
+use crate::netlist::dialects::{Dialect, Reading};
 use crate::netlist::{Card, CardKind, Names, Netlist, Subcircuit};
 use crate::source::{FileId, SourceMap, Span};
 use cursor::Cursor;
@@ -20,8 +22,28 @@ use lines::Lines;
 use number::Number;
 pub use waveforms::WAVEFORMS;
 
+/// How a netlist is to be read.
+#[derive(Clone, Debug, Default)]
+pub struct How {
+    /// In which dialect; guessed from the text where it is not said.
+    pub dialect: Option<&'static Dialect>,
+    /// The folder outside of which no file is read that a netlist names.
+    pub confine: Option<String>,
+}
+
+impl How {
+    /// In a dialect.
+    pub fn of(dialect: &'static Dialect) -> How {
+        How { dialect: Some(dialect), confine: None }
+    }
+}
+
 /// A netlist on its way.
 pub struct Reader<'d> {
+    /// The dialect.
+    pub dialect: &'static Dialect,
+    /// What it differs in.
+    pub reading: Reading,
     /// The file.
     pub file: FileId,
     /// The names so far.
@@ -31,20 +53,32 @@ pub struct Reader<'d> {
 }
 
 /// The netlist that a file holds. Lines that are wrong are left out, with errors.
-pub fn read(map: &SourceMap, file: FileId, diagnostics: &mut Vec<Diagnostic>) -> Netlist {
+pub fn read(
+    map: &mut SourceMap,
+    file: FileId,
+    how: &How,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Netlist {
     let text = map.file(file).map_or("", |file| file.text.as_str());
     let (title, body) = match text.find('\n') {
         Some(end) => (&text[..end], end + 1),
         None => (text, text.len()),
     };
+    let dialect = how.dialect.unwrap_or_else(|| {
+        let guess = guess::guess(file, text);
+        diagnostics.extend(guess.by.map(|span| guessed(guess.dialect, span)));
+        guess.dialect
+    });
     let mut netlist = Netlist {
+        dialect,
         title: title.trim_start_matches('\u{feff}').trim_end_matches('\r').to_string(),
         ..Netlist::default()
     };
-    let mut reader = Reader { file, names: Names::default(), diagnostics };
+    let reading = dialect.reading();
+    let mut reader = Reader { dialect, reading, file, names: Names::default(), diagnostics };
     let mut scopes: Vec<(Subcircuit, Span, Option<String>)> = vec![];
     let mut skipping: Option<Span> = None;
-    for line in Lines::new(text, body) {
+    for line in Lines::new(text, body, reading.comments) {
         let words: &str = &line.text;
         let span = Span::new(file, line.start, line.start + words.len());
         let mut cursor = Cursor { text: words, base: line.start, at: 0 };
@@ -135,6 +169,13 @@ pub fn read(map: &SourceMap, file: FileId, diagnostics: &mut Vec<Diagnostic>) ->
     }
     netlist.names = reader.names;
     netlist
+}
+
+/// Says how a text is read that does not say so itself.
+fn guessed(dialect: &Dialect, span: Span) -> Diagnostic {
+    Diagnostic::note("N0719", span, format!("read as a netlist for {}", dialect.name))
+        .says("only that simulator understands this")
+        .help(format!("say it with --dialect {}, or that it is another", dialect.name))
 }
 
 fn push(netlist: &mut Netlist, scopes: &mut [(Subcircuit, Span, Option<String>)], card: Card) {

@@ -4,7 +4,10 @@
 //! |---|---|---|---|---|---|---|---|---|---|---|---|
 //! | factor | 1e12 | 1e9 | 1e6 | 1e3 | 25.4e-6 | 1e-3 | 1e-6 | 1e-9 | 1e-12 | 1e-15 | 1e-18 |
 //!
-//! Case does not matter, and letters after the suffix are ignored: `1M` is a milli, `1F` a femto.
+//! Case does not matter, and letters after the suffix are ignored: `1M` is a milli, `1F` a femto. Dialects differ in `a`, in
+//! `x` for 1e6, and in whether `4k7` is 4700 ([`Numbers`]).
+
+use crate::netlist::dialects::Numbers;
 
 /// The suffixes, the longer first where one begins another. `mil` is no power of ten and stands apart.
 pub const SUFFIXES: &[(&str, i32)] = &[
@@ -34,7 +37,7 @@ pub struct Number {
 }
 
 /// The number that a text begins with.
-pub fn number(text: &str) -> Option<Number> {
+pub fn number(text: &str, numbers: Numbers) -> Option<Number> {
     let bytes = text.as_bytes();
     let digits =
         |from: usize| from + bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -68,9 +71,19 @@ pub fn number(text: &str) -> Option<Number> {
     let value = if begins("mil") {
         text[..letters].parse::<f64>().ok()? * 25.4e-6
     } else {
-        match SUFFIXES.iter().find(|(suffix, _)| begins(suffix)) {
+        let known = |suffix: &str| begins(suffix) && (suffix != "a" || numbers.atto);
+        let mega = numbers.x_is_mega && begins("x");
+        match SUFFIXES.iter().find(|(suffix, _)| known(suffix) || (mega && *suffix == "meg")) {
             None => text[..letters].parse().ok()?,
-            Some((_, power)) => {
+            Some((suffix, power)) => {
+                let behind = &text[end..];
+                let more = behind.bytes().take_while(u8::is_ascii_digit).count();
+                // `4k7`: the suffix stands for the decimal point.
+                if numbers.digits_behind && more > 0 && length == suffix.len() && letters == whole {
+                    let mantissa = format!("{}.{}", &text[..letters], &behind[..more]);
+                    let value = scaled(&mantissa, i64::from(*power))?;
+                    return Some(Number { value, letters, end: end + more });
+                }
                 // The exponent is shifted in the text, so that there is one rounding.
                 let written = text.get(mantissa + 1..letters).unwrap_or("0");
                 // What does not even fit is infinite or 0 whatever the suffix.
@@ -98,6 +111,10 @@ fn scaled(mantissa: &str, power: i64) -> Option<f64> {
 mod tests {
     use super::*;
 
+    const NGSPICE: Numbers = Numbers { atto: true, x_is_mega: false, digits_behind: false };
+    const XYCE: Numbers = Numbers { atto: false, x_is_mega: true, digits_behind: false };
+    const LTSPICE: Numbers = Numbers { atto: false, x_is_mega: false, digits_behind: true };
+
     #[test]
     #[rustfmt::skip]
     fn the_table_of_suffixes() {
@@ -109,13 +126,31 @@ mod tests {
             ("100nF", 100e-9), ("10V", 10.0), ("3Ohm", 3.0), ("2e3k", 2e6), ("2e-3meg", 2e3), ("1e", 1.0), ("1ex", 1.0),
             ("270", 270.0), ("0.1u", 0.1e-6), ("1e400", f64::INFINITY), ("1e-999999999999999999999k", 0.0),
         ] {
-            let read = number(text).unwrap();
+            let read = number(text, NGSPICE).unwrap();
             assert_eq!((read.value, read.end), (value, text.len()), "{text}");
         }
         for text in ["", "+", ".", "-.", "e3", "k", "inf", "nan", "x1"] {
-            assert_eq!(number(text), None, "{text}");
+            assert_eq!(number(text, NGSPICE), None, "{text}");
         }
-        assert_eq!(number("4k7").map(|n| (n.value, n.end)), Some((4e3, 2)));
-        assert_eq!(number("2*x").map(|n| (n.value, n.end)), Some((2.0, 1)));
+        assert_eq!(number("4k7", NGSPICE).map(|n| (n.value, n.end)), Some((4e3, 2)));
+        assert_eq!(number("2*x", NGSPICE).map(|n| (n.value, n.end)), Some((2.0, 1)));
+    }
+
+    #[test]
+    fn dialects_differ_in_suffixes() {
+        let value = |text, numbers| number(text, numbers).map(|n| (n.value, n.end));
+        for (text, ngspice, xyce, ltspice) in [
+            ("1a", (1e-18, 2), (1.0, 2), (1.0, 2)),
+            ("2x", (2.0, 2), (2e6, 2), (2.0, 2)),
+            ("2Meg5", (2e6, 4), (2e6, 4), (2.5e6, 5)),
+            ("4k7", (4e3, 2), (4e3, 2), (4700.0, 3)),
+            ("1n05", (1e-9, 2), (1e-9, 2), (1.05e-9, 4)),
+            ("1.2k7", (1200.0, 4), (1200.0, 4), (1200.0, 4)),
+            ("8kHz", (8e3, 4), (8e3, 4), (8e3, 4)),
+        ] {
+            assert_eq!(value(text, NGSPICE), Some(ngspice), "{text}");
+            assert_eq!(value(text, XYCE), Some(xyce), "{text}");
+            assert_eq!(value(text, LTSPICE), Some(ltspice), "{text}");
+        }
     }
 }

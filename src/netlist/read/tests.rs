@@ -9,7 +9,7 @@ fn read_text(text: &str) -> (Netlist, Vec<Diagnostic>) {
     let mut map = SourceMap::default();
     let file = map.add("deck.cir", text);
     let mut d = vec![];
-    let netlist = read(&map, file, &mut d);
+    let netlist = read(&mut map, file, &How::default(), &mut d);
     (netlist, d)
 }
 

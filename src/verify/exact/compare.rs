@@ -9,6 +9,7 @@ use super::wires::Wires;
 use crate::bond::graph::{BondGraph, Law, Memory, ParameterId, Power, SignalLaw, SignalOrigin};
 use crate::circuit::{DeviceKind, Leaf as CircuitLeaf};
 use crate::expr::Node;
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::flatten::scope::TOP;
 use crate::netlist::read::expression::expression;
 use crate::netlist::{Element, Expr, Leaf};
@@ -239,7 +240,7 @@ fn columns<F: Modular>(
         }
         let factor = decimal::<F>(observation.unit.1).unwrap_or(F::ONE);
         let mut names = text.netlist.names.clone();
-        let read = expression(&column.expr, &mut names, FileId(u32::MAX), 0, &mut vec![]);
+        let read = expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
         // Names that are new stand for nothing.
         let mut known = true;
         let Some(read) = read else {
