@@ -189,7 +189,7 @@ fn function(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
 fn definition(reader: &mut Reader, cursor: &mut Cursor, word: (&str, usize)) -> Option<Definition> {
     let span = cursor.span(reader, word.1, word.1 + word.0.len());
     if !cursor.take(b'(') {
-        reader.missing(cursor, "the arguments of the function, `f(x, y)`,");
+        reader.missing(cursor, "a list of arguments, `(x, y)`,");
         return None;
     }
     let mut arguments: Vec<&str> = vec![];
