@@ -169,12 +169,13 @@ impl<'a> Stamper<'a> {
                 .map(|output| (output.name.clone(), self.law(&output.expr)))
                 .collect()
         };
-        self.stamps.initial = self
-            .circuit
-            .initial
-            .iter()
-            .filter_map(|(node, value)| self.node(*node).map(|unknown| (unknown, *value)))
-            .collect();
+        let of_nodes = |values: &[(NodeId, f64)]| {
+            let unknown = |(node, value): &(NodeId, f64)| Some((self.node(*node)?, *value));
+            values.iter().filter_map(unknown).collect()
+        };
+        (self.stamps.initial, self.stamps.guesses) =
+            (of_nodes(&self.circuit.initial), of_nodes(&self.circuit.guesses));
+        self.stamps.initial_holds = self.circuit.initial_holds;
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps
     }

@@ -16,6 +16,7 @@ mod newton;
 mod op;
 mod output;
 mod reduce;
+mod remarks;
 mod search;
 mod settings;
 mod statistics;

@@ -37,6 +37,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         devices,
         initial,
         guesses,
+        initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
         outputs,
         options,
