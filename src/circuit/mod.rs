@@ -9,6 +9,7 @@ pub mod stamps;
 
 use crate::expr;
 use crate::source::Span;
+use crate::trace::measure::Measure;
 pub use waveform::Waveform;
 
 /// A node; 0 is ground.
@@ -213,6 +214,10 @@ pub struct Circuit {
     pub analyses: Vec<Analysis>,
     /// Output columns; empty means every node voltage and branch current.
     pub outputs: Vec<Output>,
+    /// What is measured, over the columns of `watched`.
+    pub measures: Vec<Measure>,
+    /// Columns that are measured and not written; they come after the others.
+    pub watched: Vec<Expr>,
     /// `.options` and header options as (key, value), later ones win.
     pub options: Vec<(String, String)>,
     /// Output grid (interval), where the header or the command line asks for one.

@@ -2,6 +2,7 @@
 
 use super::emit::{self, Stage};
 use super::flags::how;
+use super::measures::{self, Measured, Measuring};
 use super::session::{Exit, Session};
 use crate::bond::causality::{self, Causality};
 use crate::bond::elaborate::{self, Overrides};
@@ -18,6 +19,7 @@ use crate::netlist::{Netlist, flatten, read, write};
 use crate::quantity::{did_you_mean, nearest};
 use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
+use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
 use crate::translate::{self, Translation};
 use crate::verify::{self, Report};
@@ -266,6 +268,10 @@ pub struct Run {
     pub settings: Option<Settings>,
     /// Analyses that the text asks for.
     pub analyses: usize,
+    /// What is measured in the one that is run.
+    pub measures: Vec<Measure>,
+    /// Headers of all columns, those that are only measured included.
+    all: Vec<String>,
 }
 
 /// The analyses that can be picked with `--analysis`.
@@ -322,6 +328,8 @@ pub fn ready(
     let system = sim::compile(&stamps, d)?;
     let mut names: Vec<String> = if point { vec![] } else { vec!["time".into()] };
     names.extend(stamps.outputs.iter().map(|(name, _)| name.clone()));
+    let all = names.clone();
+    names.truncate(measures::shown(&all));
     let unit = |name: &String| if name == "time" { "s".into() } else { unit_of(name, units) };
     let units = names.iter().map(unit).collect();
     for (at, name) in names.iter().enumerate() {
@@ -333,7 +341,28 @@ pub fn ready(
         }
     }
     let analyses = circuit.analyses.len();
-    Some(Run { title: circuit.title, names, units, stamps, system, settings, analyses })
+    let analysis = if point { "op" } else { "tran" };
+    let (measures, others): (Vec<_>, Vec<_>) = circuit
+        .measures
+        .into_iter()
+        .partition(|measure| measure.analysis.is_empty() || measure.analysis == analysis);
+    if let Some(other) = others.first() {
+        let message =
+            format!("measures of `{}` are not taken: `{analysis}` is run", other.analysis);
+        let warning = Diagnostic::warning("W0792", other.span, message);
+        d.push(warning.help("pick the analysis with --analysis"));
+    }
+    Some(Run {
+        title: circuit.title,
+        names,
+        units,
+        stamps,
+        system,
+        settings,
+        analyses,
+        measures,
+        all,
+    })
 }
 
 /// Whether a warning or error has been said, wherever.
@@ -362,6 +391,18 @@ impl Run {
     /// # Errors
     /// Why the run did not reach its end.
     pub fn go(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+        self.go_measured(sink).0
+    }
+
+    /// Runs, and sends rows to a sink; also tells what was measured.
+    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
+        let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
+        let mut measuring = Measuring::new(sink, &self.measures, &self.all, times);
+        let result = self.analyse(&mut measuring);
+        (result, measuring.finish())
+    }
+
+    fn analyse(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
         match &self.settings {
             Some(settings) => sim::transient(&self.system, settings, sink),
             None => {

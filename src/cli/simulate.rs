@@ -3,6 +3,7 @@
 use super::emit::Stage;
 use super::flags::{DeckFlags, ModelFlags};
 use super::list;
+use super::measures;
 use super::output::{Output, write_text};
 use super::pipeline::{self, Pick, Run};
 use super::session::{Exit, Session};
@@ -53,6 +54,9 @@ pub struct Arguments {
     /// List what can be observed, with units, instead of running
     #[arg(long)]
     list: bool,
+    /// Where to write what `.measure` asks for: .csv or .json
+    #[arg(long, value_name = "FILE")]
+    measures: Option<String>,
     /// Statistics of the run on stderr
     #[arg(long, value_name = "FORM", value_parser = ["json", "text"])]
     stats: Option<String>,
@@ -115,7 +119,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     if let Some(settings) = &mut run.settings {
         watch(settings, bar.clone());
     }
-    let result = run.go(&mut output);
+    let (result, measured) = run.go_measured(&mut output);
     if let Some(bar) = bar {
         bar.clear();
     }
@@ -123,6 +127,8 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
         Ok(statistics) => {
             session.say(statistics.warnings.clone());
             output.to.close(true, session)?;
+            let name = if run.settings.is_some() { "tran" } else { "op" };
+            measures::tell(&measured, name, arguments.measures.as_deref(), session)?;
             say_statistics(arguments, &statistics, session);
             Ok(session.exit())
         }

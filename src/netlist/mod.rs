@@ -83,6 +83,8 @@ pub enum CardKind {
     Transient { step: Expr, stop: Expr, start: Option<Expr>, hmax: Option<Expr>, uic: bool },
     /// `.op`.
     OperatingPoint,
+    /// `.measure`.
+    Measure(Measure),
     /// A whole-line comment, without the asterisk.
     Comment(String),
 }
@@ -107,6 +109,22 @@ pub struct Branch {
     pub condition: Option<Expr>,
     /// Its cards.
     pub cards: Vec<Card>,
+}
+
+/// A measure over expressions of a netlist.
+pub type MeasureKind = crate::trace::measure::Kind<Expr, Expr>;
+
+/// `.measure`.
+#[derive(Clone, Debug)]
+pub struct Measure {
+    /// Its name.
+    pub name: String,
+    /// `tran`, `ac`, `dc`; empty where none is named.
+    pub analysis: String,
+    /// What it is.
+    pub kind: MeasureKind,
+    /// What stands after the keyword, as it was written.
+    pub text: String,
 }
 
 /// `.subckt` to `.ends`.

@@ -1,6 +1,6 @@
 //! Every expression of a card, for what has to look at or change all of them.
 
-use super::{Card, CardKind, Device, Element, Expr, Source, Waveform};
+use super::{Card, CardKind, Device, Element, Expr, MeasureKind, Source, Waveform};
 
 /// Calls `visit` for each expression of a card, but not of the cards within a subcircuit or a choice.
 pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
@@ -24,11 +24,24 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             visit(stop);
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
+        CardKind::Measure(measure) => measure_mut(&mut measure.kind, visit),
         CardKind::Function(_)
         | CardKind::Global(_)
         | CardKind::Options(_)
         | CardKind::OperatingPoint
         | CardKind::Comment(_) => {}
+    }
+}
+
+fn measure_mut(kind: &mut MeasureKind, visit: &mut dyn FnMut(&mut Expr)) {
+    let visit = std::cell::RefCell::new(visit);
+    let changed = |expr: &Expr| {
+        let mut expr = expr.clone();
+        visit.borrow_mut()(&mut expr);
+        Some(expr)
+    };
+    if let Some(changed) = kind.try_map(&mut &changed, &mut &changed) {
+        *kind = changed;
     }
 }
 

@@ -163,6 +163,7 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             words
         }
         CardKind::OperatingPoint => vec![word(".op")],
+        CardKind::Measure(measure) => vec![word(".measure"), measure.text.clone()],
         CardKind::Comment(_)
         | CardKind::Subcircuit(_)
         | CardKind::Choice(_)

@@ -15,6 +15,13 @@ use std::io;
 /// How often a step is halved for straight lines at most.
 const MOST_HALVED: u32 = 8;
 
+/// Columns that are measured are straight between rows within this part of what others are.
+const MEASURED: f64 = 0.1;
+
+/// A line with one bend is at a quarter, at half or at three quarters at least this part as far from a straight one as
+/// at its bend.
+const STRAIGHT: f64 = 0.75;
+
 /// What rounding may make of a column, as a part of its magnitude.
 const ROUNDING: f64 = 1e-12;
 
@@ -46,6 +53,8 @@ pub(crate) struct Rows<'a> {
     /// Times closer than this are the same.
     slack: f64,
     reltol: f64,
+    /// So many columns, the last ones, are measured.
+    watched: usize,
     /// Differences that mean nothing in any column.
     least: f64,
     /// The next row of a grid or list.
@@ -54,6 +63,7 @@ pub(crate) struct Rows<'a> {
     row: Vec<f64>,
     /// The row at the left end of a step, and extremes of each column so far.
     left: Vec<f64>,
+    middle: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
     inside: Inside,
@@ -79,10 +89,12 @@ impl<'a> Rows<'a> {
             stop: settings.stop,
             slack: 1e-12 * settings.stop,
             reltol: settings.reltol,
+            watched: system.watched,
             least: 1e-2 * settings.abstol,
             next: 0,
             row: vec![0.0; columns + 1],
             left: vec![0.0; columns + 1],
+            middle: vec![0.0; columns + 1],
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
             inside: Inside::new(network),
@@ -165,9 +177,14 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Whether rows are written at every step.
+    /// Whether rows are made at every step, to be written or measured.
     pub fn follows_steps(&self) -> bool {
-        self.interval == Interval::Steps
+        self.interval == Interval::Steps || self.watched > 0
+    }
+
+    /// Whether rows are written at times of their own.
+    pub fn has_times(&self) -> bool {
+        self.interval != Interval::Steps
     }
 
     /// Writes a row at a step's end, or at one side of a jump.
@@ -192,7 +209,7 @@ impl<'a> Rows<'a> {
         self.inside.point.t = state.t;
         self.evaluate(network, time);
         if time >= self.start - self.slack {
-            self.send(network)?;
+            self.send_step(network)?;
         }
         self.widen();
         self.left.copy_from_slice(&self.row);
@@ -232,18 +249,24 @@ impl<'a> Rows<'a> {
             let span = right[0] - left[0];
             let mut off = 0.0;
             if halved < MOST_HALVED && span > self.slack {
-                // A curve that swings about its line may cross it in the middle.
-                let thetas: &[f64] = if halved < 2 { &[0.3, 0.5] } else { &[0.5] };
-                for theta in thetas {
+                // A curve that swings about its line may cross it in the middle, and a bend may lie near an end.
+                for theta in [0.5, 0.25, 0.75] {
                     let time = left[0] + theta * span;
                     self.inside.between(network, from, to, time, index2, weights, work)?;
                     self.evaluate(network, time);
                     self.widen();
-                    off = self.off_line(*theta, &left, &right).max(off);
+                    off = self.off_line(theta, &left, &right).max(off);
+                    if theta == 0.5 {
+                        self.middle.copy_from_slice(&self.row);
+                    }
+                    if off > STRAIGHT {
+                        break;
+                    }
                 }
+                self.row.copy_from_slice(&self.middle);
             }
             // What does not become straighter is rounding.
-            let straight = off <= 1.0 || (halved > 4 && off >= before);
+            let straight = off <= STRAIGHT || (halved > 4 && off >= before);
             if !straight {
                 let middle = self.row.clone();
                 pile.push((right, halved + 1, off));
@@ -253,7 +276,7 @@ impl<'a> Rows<'a> {
             left.copy_from_slice(&right);
             if !pile.is_empty() && left[0] >= self.start - self.slack {
                 self.row.copy_from_slice(&left);
-                self.send(network)?;
+                self.send_step(network)?;
             }
         }
         self.left = left;
@@ -271,12 +294,16 @@ impl<'a> Rows<'a> {
     /// How far the present row is from the line between two others, in units of what is allowed.
     fn off_line(&self, theta: f64, left: &[f64], right: &[f64]) -> f64 {
         let mut most: f64 = 0.0;
-        for c in 0..self.low.len() {
+        let measured = self.low.len() - self.watched;
+        // Columns that are written at times of their own need not be straight between steps.
+        let first = if self.has_times() { measured } else { 0 };
+        for c in first..self.low.len() {
+            let reltol = if c < measured { self.reltol } else { MEASURED * self.reltol };
             let (a, b) = (left[c + 1], right[c + 1]);
             let off = (self.row[c + 1] - (a + theta * (b - a))).abs();
             let (low, high) = (self.low[c], self.high[c]);
             let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
-            most = most.max(off / (self.reltol * (high - low)).max(rounding));
+            most = most.max(off / (reltol * (high - low)).max(rounding));
         }
         most
     }
@@ -298,6 +325,20 @@ impl<'a> Rows<'a> {
 
     fn send(&mut self, network: &mut Network) -> Result<(), Stopped> {
         network.statistics.rows += 1;
+        self.check_row(network)?;
+        Ok(self.sink.row(&self.row)?)
+    }
+
+    /// Sends the row of a step: it is written, or only measured.
+    fn send_step(&mut self, network: &mut Network) -> Result<(), Stopped> {
+        if !self.has_times() {
+            return self.send(network);
+        }
+        self.check_row(network)?;
+        Ok(self.sink.step(&self.row)?)
+    }
+
+    fn check_row(&mut self, network: &mut Network) -> Result<(), Stopped> {
         for value in &mut self.row {
             // −0 becomes 0.
             *value += 0.0;
@@ -306,7 +347,7 @@ impl<'a> Rows<'a> {
             let device = network.non_finite_law();
             return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
         }
-        Ok(self.sink.row(&self.row)?)
+        Ok(())
     }
 }
 

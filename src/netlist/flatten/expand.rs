@@ -222,6 +222,7 @@ impl<'n> Expander<'n> {
                 | CardKind::Save { .. }
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
+                | CardKind::Measure(_)
                     if id != TOP =>
                 {
                     let message = "this card belongs outside `.subckt`";

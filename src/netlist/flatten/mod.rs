@@ -9,6 +9,7 @@ pub mod values;
 mod kinds;
 mod sources;
 mod experiment;
+mod measures;
 mod usage;
 
 use super::{Netlist, header::Header};
@@ -31,6 +32,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     let devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
     let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
+    let (measures, watched) = measures::resolve(&flat, diagnostics);
     let mut circuit = Circuit {
         title: netlist.title.clone(),
         nodes: flat.nodes,
@@ -40,6 +42,8 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
         outputs,
+        measures,
+        watched,
         options,
         grid: header.grid,
         ..Circuit::default()

@@ -294,7 +294,8 @@ impl<'a> Writer<'a> {
             | CardKind::Options(_)
             | CardKind::Save { .. }
             | CardKind::Transient { .. }
-            | CardKind::OperatingPoint => {}
+            | CardKind::OperatingPoint
+            | CardKind::Measure(_) => {}
         }
     }
 

@@ -50,8 +50,8 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("plot", Skipped(RESULT)),
     ("probe", Skipped(RESULT)),
     ("four", Skipped(RESULT)),
-    ("meas", Skipped(RESULT)),
-    ("measure", Skipped(RESULT)),
+    ("meas", Read(super::measure::measure)),
+    ("measure", Read(super::measure::measure)),
     ("width", Skipped("it lays out another simulator's print")),
     ("ac", Refused(ANALYSIS)),
     ("dc", Refused(ANALYSIS)),
@@ -431,7 +431,7 @@ fn end_of_item(cursor: &Cursor) -> usize {
 }
 
 /// One item: how it is written, and what it means. `node` is v(node), `v1#branch` is i(v1), `@r1[i]` is i(r1).
-fn item(
+pub(super) fn item(
     reader: &mut Reader,
     cursor: &mut Cursor,
     from: usize,
