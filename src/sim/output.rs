@@ -4,7 +4,7 @@
 //! row. No step is ever cut for a row. Where the circuit is of index 2, charges say too little: there a shorter step of
 //! TR-BDF2 leads from the step's start to the row.
 
-use super::methods::{Work, trbdf2};
+use super::methods::{Dense, Work, trbdf2};
 use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
@@ -76,6 +76,9 @@ pub(crate) struct Inside {
     held: Vec<bool>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     pub factorised: Option<bool>,
+    /// Values of a shorter step, and where the dense output of the whole one waits meanwhile.
+    shorter: State,
+    dense: Dense,
 }
 
 impl<'a> Rows<'a> {
@@ -358,6 +361,8 @@ impl Inside {
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
             factorised: None,
+            shorter: State::new(0.0, system.equations(), system.charges()),
+            dense: Dense::new(system.equations(), system.charges()),
         }
     }
 
@@ -384,7 +389,19 @@ impl Inside {
         }
         // On a ramp laws make much of the least error of a charge: what was interpolated stands.
         let ramped = network.any_ramped();
-        self.finish_point(network, time, ramped, weights, work)
+        let belong = self.finish_point(network, time, ramped, weights, work)?;
+        if !belong && theta >= SHORT {
+            // Charges of junctions that are almost empty say little of their voltages: a step to the row says more.
+            self.shorter.copy_from(&self.point);
+            std::mem::swap(&mut self.dense, &mut work.dense);
+            let taken = trbdf2::step(network, from, &mut self.shorter, weights, work);
+            std::mem::swap(&mut self.dense, &mut work.dense);
+            if matches!(taken, Ok(error) if error <= 1.0) {
+                self.point.copy_from(&self.shorter);
+            }
+            self.factorised = None;
+        }
+        Ok(())
     }
 
     /// The same by a step of its own, so that algebraic relations between charges and rates hold.
@@ -416,7 +433,8 @@ impl Inside {
         }
     }
 
-    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`.
+    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`. Says
+    /// whether they do as far as could be.
     pub fn finish_point(
         &mut self,
         network: &mut Network,
@@ -424,21 +442,22 @@ impl Inside {
         as_is: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> Result<(), Stopped> {
+    ) -> Result<bool, Stopped> {
         self.point.t = time;
         if as_is {
-            return Ok(());
+            return Ok(true);
         }
         work.x.copy_from_slice(&self.point.x);
         work.w.copy_from_slice(&self.point.w);
         let targets = std::mem::take(&mut self.point.q);
         let corrected = self.correct(network, &targets, time, weights, work);
         self.point.q = targets;
-        if corrected.map_err(|cut| Stopped::Values(time, cut))? {
+        let belong = corrected.map_err(|cut| Stopped::Values(time, cut))?;
+        if belong {
             self.point.x.copy_from_slice(&work.x);
             self.point.w.copy_from_slice(&work.w);
         }
-        Ok(())
+        Ok(belong)
     }
 
     /// Whether the correction came to its end; an error where there are no finite values.
