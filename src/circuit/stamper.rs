@@ -180,6 +180,7 @@ impl<'a> Stamper<'a> {
         };
         (self.stamps.initial, self.stamps.guesses) =
             (of_nodes(&self.circuit.initial), of_nodes(&self.circuit.guesses));
+        self.stamps.starts = of_nodes(&self.circuit.starts);
         self.stamps.initial_holds = self.circuit.initial_holds;
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps

@@ -115,6 +115,11 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
+    for (unknown, value) in &network.system.starts {
+        if !network.system.initial.iter().any(|(stated, _)| stated == unknown) {
+            state.x[*unknown as usize] = *value;
+        }
+    }
     network.pins.clone_from(&network.system.initial);
     let mut held = vec![false; network.system.charges()];
     let mut tied = vec![];

@@ -10,6 +10,7 @@ mod kinds;
 mod sources;
 mod experiment;
 mod measures;
+mod guess;
 mod usage;
 
 use super::{Netlist, header::Header};
@@ -31,6 +32,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     let times = sources::Times::of(&analyses);
     let devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
+    let starts = guess::follow(&devices, flat.nodes.len(), &guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
     let (measures, watched) = measures::resolve(&flat, diagnostics);
     let mut circuit = Circuit {
@@ -39,6 +41,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         devices,
         initial,
         guesses,
+        starts,
         initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
         outputs,
