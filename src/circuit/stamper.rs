@@ -178,9 +178,10 @@ impl<'a> Stamper<'a> {
             let unknown = |(node, value): &(NodeId, f64)| Some((self.node(*node)?, *value));
             values.iter().filter_map(unknown).collect()
         };
+        let starts = of_nodes(&self.circuit.starts);
         (self.stamps.initial, self.stamps.guesses) =
             (of_nodes(&self.circuit.initial), of_nodes(&self.circuit.guesses));
-        self.stamps.starts = of_nodes(&self.circuit.starts);
+        self.stamps.starts = starts;
         self.stamps.initial_holds = self.circuit.initial_holds;
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps

@@ -115,10 +115,8 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
-    for (unknown, value) in &network.system.starts {
-        if !network.system.initial.iter().any(|(stated, _)| stated == unknown) {
-            state.x[*unknown as usize] = *value;
-        }
+    for (unknown, value) in network.system.starts.iter().chain(&network.system.initial) {
+        state.x[*unknown as usize] = *value;
     }
     network.pins.clone_from(&network.system.initial);
     let mut held = vec![false; network.system.charges()];

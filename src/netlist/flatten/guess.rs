@@ -10,11 +10,7 @@ use crate::circuit::{Device, DeviceKind, Expr, Leaf, NodeId};
 const ROUNDS: usize = 30;
 
 /// What follows from sources, at t = 0, and from the guesses that are given.
-pub fn follow(
-    devices: &[Device],
-    nodes: usize,
-    guesses: &[(NodeId, f64)],
-) -> Vec<(NodeId, f64)> {
+pub fn follow(devices: &[Device], nodes: usize, guesses: &[(NodeId, f64)]) -> Vec<(NodeId, f64)> {
     let mut starts = vec![];
     let law = |device: &Device| {
         matches!(
