@@ -205,6 +205,8 @@ pub struct Circuit {
     pub devices: Vec<Device>,
     /// `.ic` values.
     pub initial: Vec<(NodeId, f64)>,
+    /// Where to look for an operating point: `.nodeset`.
+    pub guesses: Vec<(NodeId, f64)>,
     /// What is to be computed, in netlist order.
     pub analyses: Vec<Analysis>,
     /// Output columns; empty means every node voltage and branch current.

@@ -81,6 +81,7 @@ pub fn how(overrides: &Overrides) -> How {
     How {
         dialect: overrides.dialect.as_deref().and_then(dialects::find),
         confine: overrides.confine.clone(),
+        folders: overrides.folders.clone(),
     }
 }
 

@@ -19,19 +19,23 @@ pub(super) struct Part<L> {
 
 pub(super) enum Operator {
     Infix(Binary),
+    /// Where `^` means that exactly one of two holds.
+    ExclusiveOr,
     Negate(Span),
     Plus,
-    Not(Span),
+    /// With whether it binds loosely.
+    Not(Span, bool),
 }
 
 impl Operator {
     fn precedence(&self, dialect: Dialect) -> u8 {
         match self {
-            Operator::Infix(op) => precedence(*op),
+            Operator::Infix(op) => precedence(*op, dialect),
+            Operator::ExclusiveOr => exclusive_or(dialect),
             Operator::Negate(_) | Operator::Plus => SIGN,
-            // SPICE's `!` binds as tightly as a sign.
-            Operator::Not(_) => {
-                if dialect == Dialect::Bond {
+            // SPICE's `!` binds as tightly as a sign; `~` of Xyce and LTspice as loosely as `not`.
+            Operator::Not(_, loose) => {
+                if *loose {
                     NOT
                 } else {
                     SIGN
@@ -50,9 +54,11 @@ pub(super) struct Stack<'d, L> {
 }
 
 /// How tightly an operator binds; `not` and the unary minus are the gaps between.
-fn precedence(op: Binary) -> u8 {
+fn precedence(op: Binary, dialect: Dialect) -> u8 {
     match op {
         Binary::Or => 1,
+        // Xyce and LTspice take both in the order of the text.
+        Binary::And if matches!(dialect, Dialect::Xyce | Dialect::Ltspice) => 1,
         Binary::And => 2,
         Binary::Equal
         | Binary::NotEqual
@@ -64,6 +70,11 @@ fn precedence(op: Binary) -> u8 {
         Binary::Multiply | Binary::Divide => 6,
         Binary::Power => 8,
     }
+}
+
+/// How tightly `^` binds where it is logic: in Xyce between `~` and comparisons, in LTspice as `&` and `|`.
+fn exclusive_or(dialect: Dialect) -> u8 {
+    if dialect == Dialect::Ltspice { 1 } else { 3 }
 }
 
 const NOT: u8 = 3;
@@ -90,11 +101,11 @@ pub(super) fn join<L>(
 impl<L> Stack<'_, L> {
     /// Takes an operator between operands, after everything that binds more tightly.
     pub(super) fn infix(&mut self, op: Binary, span: Span) -> Option<()> {
-        let arriving = precedence(op);
+        let arriving = precedence(op, self.dialect);
         let result = self.reduce(arriving + 1);
-        if arriving == precedence(Binary::Equal)
+        if op.is_comparison()
             && self.dialect == Dialect::Bond
-            && matches!(self.operators.last(), Some(Operator::Infix(before)) if precedence(*before) == arriving)
+            && matches!(self.operators.last(), Some(Operator::Infix(before)) if before.is_comparison())
         {
             self.diagnostics.push(
                 Diagnostic::error("E0113", span, "comparisons do not chain")
@@ -103,6 +114,13 @@ impl<L> Stack<'_, L> {
             return None;
         }
         self.operators.push(Operator::Infix(op));
+        result
+    }
+
+    /// Takes a `^` that is logic.
+    pub(super) fn exclusive_or(&mut self) -> Option<()> {
+        let result = self.reduce(exclusive_or(self.dialect) + 1);
+        self.operators.push(Operator::ExclusiveOr);
         result
     }
 
@@ -115,15 +133,15 @@ impl<L> Stack<'_, L> {
                 break;
             }
             match top {
-                Operator::Infix(..) => {
-                    let run = self
-                        .operators
-                        .iter()
-                        .rev()
-                        .take_while(
-                            |o| matches!(o, Operator::Infix(op) if precedence(*op) == level),
-                        )
-                        .count();
+                Operator::Infix(..) | Operator::ExclusiveOr => {
+                    let dialect = self.dialect;
+                    let same = |o: &&Operator| match o {
+                        Operator::Infix(_) | Operator::ExclusiveOr => {
+                            o.precedence(dialect) == level
+                        }
+                        _ => false,
+                    };
+                    let run = self.operators.iter().rev().take_while(same).count();
                     let operators = self.operators.split_off(self.operators.len() - run);
                     let operands =
                         self.operands.split_off(self.operands.len().saturating_sub(run + 1));
@@ -151,7 +169,16 @@ impl<L> Stack<'_, L> {
     fn prefix(&mut self, operator: Operator, operand: Part<L>) -> Option<Part<L>> {
         let (unary, span) = match operator {
             Operator::Negate(span) => (Unary::Negate, span.join(operand.place)),
-            Operator::Not(span) => (Unary::Not, span.join(operand.place)),
+            Operator::Not(span, _) => {
+                let operand = self.truth(operand)?;
+                let span = span.join(operand.place);
+                return join(
+                    Node::Unary(Unary::Not, operand.expr),
+                    operand.depth,
+                    span,
+                    self.diagnostics,
+                );
+            }
             _ => return Some(operand),
         };
         if let (Unary::Negate, Some(value)) = (unary, operand.expr.as_number()) {
@@ -163,25 +190,43 @@ impl<L> Stack<'_, L> {
 
     /// A run of operators of one precedence over one operand more.
     fn chain(&mut self, operators: Vec<Operator>, operands: Vec<Part<L>>) -> Option<Part<L>> {
+        // Exactly one holds: both taken as 1 or 0, and these differ. Stands among the others as `!=`, which never shares a
+        // precedence with it.
         let ops: Vec<Binary> = operators
             .iter()
-            .filter_map(|o| if let Operator::Infix(op) = o { Some(*op) } else { None })
+            .filter_map(|o| match o {
+                Operator::Infix(op) => Some(*op),
+                Operator::ExclusiveOr => Some(Binary::NotEqual),
+                _ => None,
+            })
             .collect();
+        let exclusive = operators.iter().any(|o| matches!(o, Operator::ExclusiveOr));
         let power = ops.first() == Some(&Binary::Power);
-        if power && self.dialect == Dialect::Bond {
+        let from_right = matches!(self.dialect, Dialect::Bond | Dialect::Xyce);
+        if power && from_right {
             let mut rest = operands.into_iter().rev();
             let last = rest.next()?;
             return rest.try_fold(last, |right, left| self.operation(Binary::Power, left, right));
         }
-        if ops.len() > LONG_CHAIN && matches!(precedence(ops[0]), 1 | 2 | 5 | 6) {
+        let one = ops
+            .windows(2)
+            .all(|pair| precedence(pair[0], Dialect::Bond) == precedence(pair[1], Dialect::Bond));
+        let balances = matches!(precedence(ops[0], Dialect::Bond), 1 | 2 | 5 | 6);
+        if ops.len() > LONG_CHAIN && balances && one && !exclusive {
             let mut operands = operands.into_iter().map(Some).collect::<Vec<_>>();
             return self.balanced(&ops, &mut operands, false);
         }
         let mut rest = operands.into_iter();
         let first = rest.next()?;
-        ops.into_iter()
-            .zip(rest)
-            .try_fold(first, |left, (op, right)| self.operation(op, left, right))
+        ops.into_iter().zip(rest).zip(operators).try_fold(first, |left, ((op, right), operator)| {
+            match operator {
+                Operator::ExclusiveOr => {
+                    let (left, right) = (self.inverted(left)?, self.inverted(right)?);
+                    self.operation(op, left, right)
+                }
+                _ => self.operation(op, left, right),
+            }
+        })
     }
 
     /// The same value (up to rounding) as a tree of logarithmic depth. `inverted`: a minus or a division stands
@@ -212,13 +257,42 @@ impl<L> Stack<'_, L> {
     }
 
     fn operation(&mut self, op: Binary, left: Part<L>, right: Part<L>) -> Option<Part<L>> {
+        let (left, right) = match op {
+            Binary::And | Binary::Or => (self.truth(left)?, self.truth(right)?),
+            _ => (left, right),
+        };
         let span = left.place.join(right.place);
         let depth = left.depth.max(right.depth);
-        let node = if op == Binary::Power && self.dialect != Dialect::Bond {
-            Node::Call(Function::PowerOfAbs, vec![left.expr, right.expr])
-        } else {
-            Node::Binary(op, left.expr, right.expr)
+        let whole = right.expr.as_number().is_some_and(|power| power == power.trunc());
+        let node = match (op, self.dialect) {
+            (Binary::Power, Dialect::Ngspice) => {
+                Node::Call(Function::PowerOfAbs, vec![left.expr, right.expr])
+            }
+            (Binary::Power, Dialect::Xyce | Dialect::Ltspice) if !whole => {
+                Node::Call(Function::RealPower, vec![left.expr, right.expr])
+            }
+            _ => Node::Binary(op, left.expr, right.expr),
         };
         join(node, depth, span, self.diagnostics)
+    }
+
+    fn inverted(&mut self, part: Part<L>) -> Option<Part<L>> {
+        let part = self.truth(part)?;
+        let place = part.place;
+        join(Node::Unary(Unary::Not, part.expr), part.depth, place, self.diagnostics)
+    }
+
+    /// What a condition rests on: LTspice takes a value for true above ½, all others where it is not 0.
+    pub(super) fn truth(&mut self, part: Part<L>) -> Option<Part<L>> {
+        let logical = match &*part.expr.node {
+            Node::Unary(Unary::Not, _) => true,
+            Node::Binary(op, ..) => op.is_comparison() || matches!(op, Binary::And | Binary::Or),
+            _ => false,
+        };
+        if self.dialect != Dialect::Ltspice || logical {
+            return Some(part);
+        }
+        let (place, half) = (part.place, Expr::number(0.5));
+        join(Node::Binary(Binary::Greater, part.expr, half), part.depth, place, self.diagnostics)
     }
 }

@@ -187,5 +187,6 @@ fn endless_slope(function: Function) -> bool {
             | Function::Acosh
             | Function::Atanh
             | Function::SignedPower
+            | Function::RealPower
     )
 }

@@ -5,7 +5,7 @@
 //! the same model gives the same digits everywhere.
 
 use super::tree::{Binary, Expr};
-use super::values::{atan2, clamp, max, min, modulo, power_of_abs, sign, signed_power};
+use super::values::{atan2, clamp, max, min, modulo, power_of_abs, real_power, sign, signed_power};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 /// A function that expressions may call; its row in [`FUNCTIONS`] says the rest.
@@ -43,6 +43,8 @@ pub enum Function {
     PowerOfAbs,
     /// `sign(x)·|x|^y` (ngspice's `pwr`).
     SignedPower,
+    /// The real part of x^y: for x < 0, |x|^y·cos(π·y) (`pow` of Xyce and LTspice).
+    RealPower,
 }
 
 /// The spellings of expressions.
@@ -297,91 +299,32 @@ pub const FUNCTIONS: &[Row] = &[
             f(Function::Sign, a()) * size
         })
     ),
+    row!(
+        RealPower,
+        "realpow",
+        Two(real_power),
+        |k| {
+            if k == 0 {
+                return b() * f2(Function::RealPower, a(), b() - n(1.0));
+            }
+            let turned = f(Function::Exp, b() * f(Function::Ln, f(Function::Abs, a())))
+                * f(Function::Sin, n(PI) * b());
+            let growth = y() * f(Function::Ln, f(Function::Abs, a()));
+            let below = growth.clone() - n(PI) * turned;
+            either(is_zero(a()), n(0.0), either(less(a(), n(0.0)), below, growth))
+        },
+        Expansion(|| {
+            let size = f(Function::Exp, b() * f(Function::Ln, f(Function::Abs, a())));
+            let turned = size.clone() * f(Function::Cos, n(PI) * b());
+            either(less(a(), n(0.0)), turned, size)
+        })
+    ),
 ];
 
 impl Function {
     /// Its row of the table.
     pub fn row(self) -> &'static Row {
         &FUNCTIONS[self as usize]
-    }
-}
-
-/// What a name of a dialect's text means.
-pub enum Meaning {
-    /// The function.
-    Function(Function),
-    /// A tree over as many arguments.
-    Expansion {
-        /// How many arguments.
-        arguments: usize,
-        /// The tree.
-        template: fn() -> Template,
-    },
-}
-
-impl Meaning {
-    /// How many arguments it takes.
-    pub fn arguments(&self) -> usize {
-        match self {
-            Meaning::Function(function) => function.row().value.arguments(),
-            Meaning::Expansion { arguments, .. } => *arguments,
-        }
-    }
-}
-
-/// What netlists call a function other than by its name in the table. `log` is the natural one, `pow` and `pwr` take
-/// the magnitude of their base (ngspice 39); `u(0)` is ½.
-const NGSPICE_NAMES: &[(&str, Meaning)] = &[
-    ("sgn", Meaning::Function(Function::Sign)),
-    ("log", Meaning::Function(Function::Ln)),
-    ("pow", Meaning::Function(Function::PowerOfAbs)),
-    ("pwr", Meaning::Function(Function::SignedPower)),
-    (
-        "u",
-        Meaning::Expansion {
-            arguments: 1,
-            template: || n(0.5) * (n(1.0) + f(Function::Sign, a())),
-        },
-    ),
-    ("uramp", Meaning::Expansion { arguments: 1, template: || f2(Function::Max, a(), n(0.0)) }),
-    (
-        "u2",
-        Meaning::Expansion {
-            arguments: 1,
-            template: || Expr::call(Function::Clamp, vec![a(), n(0.0), n(1.0)]),
-        },
-    ),
-    ("ceil", Meaning::Expansion { arguments: 1, template: || -f(Function::Floor, -a()) }),
-    ("arctan", Meaning::Function(Function::Atan)),
-    ("if", Meaning::Expansion { arguments: 3, template: || either(a(), b(), c()) }),
-    (
-        "limit",
-        Meaning::Expansion {
-            arguments: 3,
-            template: || Expr::call(Function::Clamp, vec![a(), b(), c()]),
-        },
-    ),
-];
-
-/// What a name means in a dialect. Netlists fold case; `.bg` files do not.
-pub fn find(dialect: Dialect, name: &str) -> Option<Meaning> {
-    let in_table = |name: &str| {
-        FUNCTIONS.iter().find(|row| row.name == name).map(|row| Meaning::Function(row.function))
-    };
-    match dialect {
-        Dialect::Bond => in_table(name),
-        _ => {
-            let folded = name.to_lowercase();
-            let own = NGSPICE_NAMES.iter().find(|(own, _)| *own == folded);
-            match own {
-                Some((_, Meaning::Function(function))) => Some(Meaning::Function(*function)),
-                Some((_, Meaning::Expansion { arguments, template })) => {
-                    Some(Meaning::Expansion { arguments: *arguments, template: *template })
-                }
-                None if folded == "sign" => None,
-                None => in_table(&folded),
-            }
-        }
     }
 }
 
@@ -431,7 +374,7 @@ mod tests {
         for (k, row) in FUNCTIONS.iter().enumerate() {
             assert_eq!(row.function as usize, k, "{}", row.name);
         }
-        assert_eq!(FUNCTIONS.len(), Function::SignedPower as usize + 1);
+        assert_eq!(FUNCTIONS.len(), Function::RealPower as usize + 1);
     }
 
     /// A point where every function is smooth and real.
@@ -440,7 +383,7 @@ mod tests {
             Function::Asin | Function::Acos | Function::Atanh => vec![0.9 * u],
             Function::Acosh => vec![2.5 + u],
             Function::Sqrt | Function::Ln | Function::Log10 => vec![2.0 + u],
-            Function::PowerOfAbs | Function::SignedPower => {
+            Function::PowerOfAbs | Function::SignedPower | Function::RealPower => {
                 vec![0.1f64.copysign(u) + 2.0 * u, 3.0 * v]
             }
             Function::Mod => vec![5.0 * u, 0.7f64.copysign(v) + v],

@@ -6,11 +6,13 @@
 pub mod tree;
 pub mod values;
 pub mod functions;
+pub mod names;
 pub mod evaluate;
 mod chains;
 pub mod parse;
 pub mod dag;
 mod derivative;
+pub mod slope;
 pub mod program;
 pub mod print;
 #[cfg(test)]

@@ -27,7 +27,8 @@
 //! So no later stage that walks a tree can overflow its stack.
 
 use super::chains::{Operator, Part, Stack, join, measured};
-use super::functions::{self, Dialect, Function, Meaning, Slot, Template};
+use super::functions::{self, Dialect, Function, Slot, Template};
+use super::names::{self, Meaning};
 use super::tree::{Binary, Expr, Node};
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
@@ -211,12 +212,21 @@ fn convert<L: Language>(
             Role::Word => branching = true,
             _ if branching => branches.push(part),
             Role::Infix(op) if after_operand => {
-                failed |= stack.infix(op, span).is_none();
+                // `^` is a power to some, and logic to others.
+                let logic = op == Binary::Power
+                    && matches!(stack.dialect, Dialect::Xyce | Dialect::Ltspice)
+                    && part.as_str() == "^";
+                let taken = if logic { stack.exclusive_or() } else { stack.infix(op, span) };
+                failed |= taken.is_none();
                 after_operand = false;
             }
             Role::Infix(Binary::Subtract) => stack.operators.push(Operator::Negate(span)),
             Role::Infix(_) => stack.operators.push(Operator::Plus),
-            Role::Not => stack.operators.push(Operator::Not(span)),
+            Role::Not => {
+                let loose = stack.dialect == Dialect::Bond
+                    || (part.as_str() == "~" && stack.dialect == Dialect::Xyce);
+                stack.operators.push(Operator::Not(span, loose));
+            }
             _ => {
                 let operand = match role {
                     Role::Expression => {
@@ -238,7 +248,10 @@ fn convert<L: Language>(
         }
     }
     failed |= stack.reduce(0).is_none();
-    let value = stack.operands.pop();
+    let mut value = stack.operands.pop();
+    if !branches.is_empty() {
+        value = value.and_then(|value| stack.truth(value));
+    }
     let d = stack.diagnostics;
     let mut branches = branches.into_iter();
     let value = match (branches.next(), branches.next()) {
@@ -293,7 +306,7 @@ fn call<L: Language>(
     let span = language.span(pair.as_span());
     let mut inner = pair.clone().into_inner();
     let name = inner.next()?.as_str().trim_end();
-    let Some(meaning) = functions::find(language.dialect(), name) else {
+    let Some(meaning) = names::find(language.dialect(), name) else {
         return language.call(name, pair.clone(), d).map(measured);
     };
     let (mut arguments, mut strange) = (vec![], false);
@@ -311,10 +324,10 @@ fn call<L: Language>(
         }
     }
     let arguments: Vec<_> = arguments.into_iter().collect::<Option<_>>()?;
-    let wanted = meaning.arguments();
+    let (wanted, most) = meaning.arguments();
     let associative =
         matches!(meaning, Meaning::Function(Function::Min | Function::Max)) && arguments.len() > 2;
-    if arguments.len() != wanted && !associative {
+    if !(wanted..=most).contains(&arguments.len()) && !associative {
         let plural = if wanted == 1 { "" } else { "s" };
         d.push(
             Diagnostic::error("E0112", span, format!("`{name}` takes {wanted} argument{plural}"))

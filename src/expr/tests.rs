@@ -265,11 +265,11 @@ fn what_is_too_deep_is_refused() {
 #[test]
 fn functions_have_names_in_both() {
     for row in super::FUNCTIONS {
-        assert!(super::functions::find(Dialect::Bond, row.name).is_some());
+        assert!(super::names::find(Dialect::Bond, row.name).is_some());
     }
     assert!(matches!(
-        super::functions::find(Dialect::Ngspice, "PWR"),
-        Some(super::functions::Meaning::Function(Function::SignedPower))
+        super::names::find(Dialect::Ngspice, "PWR"),
+        Some(super::names::Meaning::Function(Function::SignedPower))
     ));
 }
 
@@ -427,6 +427,7 @@ fn tame(expr: &Expr<String>) -> bool {
                     | Function::Sign
                     | Function::Atan2
                     | Function::SignedPower
+                    | Function::RealPower
             );
             let smooth = !jumps
                 || arguments.iter().all(|a| (at(a) - at(a).round()).abs() > 1e-6)

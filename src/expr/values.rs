@@ -75,6 +75,14 @@ pub(super) fn signed_power(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { sign(x) * power(x.abs(), y) }
 }
 
+/// The real part of x^y. Whole exponents keep the sign of an odd power exactly.
+pub(super) fn real_power(x: f64, y: f64) -> f64 {
+    if x >= 0.0 || y == y.trunc() || x.is_nan() {
+        return power(x, y);
+    }
+    power(-x, y) * libm::cos(std::f64::consts::PI * y)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -58,6 +58,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("mod", "the rest of x by y, with the sign of y"),
     ("abspow", "|x|^y"),
     ("signpow", "|x|^y with the sign of x"),
+    ("realpow", "the real part of x^y"),
     ("sum", "a sum over whole numbers: sum(k in 1..N, x[k])"),
     ("step", "`before` until t0, then `after`"),
     ("ramp", "0 until t0, then slope·(t − t0)"),

@@ -152,7 +152,6 @@ pub const DIALECTS: &[Dialect] = &[
         read: Some(Reading {
             numbers: Numbers { atto: false, x_is_mega: false, digits_behind: true },
             comments: &[";"],
-            colons: true,
             ..READING
         }),
         ..NGSPICE

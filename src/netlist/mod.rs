@@ -1,6 +1,7 @@
 //! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
 
 pub mod names;
+pub mod visit;
 pub mod header;
 pub mod read;
 pub mod write;
@@ -62,6 +63,14 @@ pub enum CardKind {
     Options(Vec<(String, String)>),
     /// `.ic v(node) = value`.
     Initial(Vec<(Name, Expr)>),
+    /// `.nodeset v(node) = value`: where to look for an operating point.
+    Guess(Vec<(Name, Expr)>),
+    /// `.global node …`: nodes that are one in every subcircuit.
+    Global(Vec<Name>),
+    /// `.func`; once a netlist is read, its body stands in the place of every call.
+    Function(Definition),
+    /// `.if (condition) … .elseif … .else … .endif`.
+    Choice(Vec<Branch>),
     /// `.save` or `.print tran`: the items as written and read.
     Save {
         /// Whether it was `.print`.
@@ -76,6 +85,28 @@ pub enum CardKind {
     OperatingPoint,
     /// A whole-line comment, without the asterisk.
     Comment(String),
+}
+
+/// `.func name(arguments) {body}`.
+#[derive(Clone, Debug)]
+pub struct Definition {
+    /// Its name.
+    pub name: Name,
+    /// Its arguments, by names that no text can spell.
+    pub arguments: Vec<Name>,
+    /// Its value.
+    pub body: Expr,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A branch of `.if`.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// What holds where it counts, none before it having held; `None` for `.else`.
+    pub condition: Option<Expr>,
+    /// Its cards.
+    pub cards: Vec<Card>,
 }
 
 /// `.subckt` to `.ends`.

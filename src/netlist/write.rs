@@ -88,6 +88,20 @@ fn cards(text: &mut String, form: Form, cards: &[Card]) {
                     form.dialect.comments,
                 );
             }
+            CardKind::Choice(branches) => {
+                for (k, branch) in branches.iter().enumerate() {
+                    let word = if k == 0 { ".if" } else { ".elseif" };
+                    let words = match &branch.condition {
+                        Some(condition) => {
+                            vec![word.to_string(), format!("({})", form.expression(condition))]
+                        }
+                        None => vec![".else".to_string()],
+                    };
+                    line(text, &words, None, form.dialect.comments);
+                    self::cards(text, form, &branch.cards);
+                }
+                line(text, &[".endif".to_string()], None, form.dialect.comments);
+            }
             kind => line(text, &words(form, kind), card.comment.as_deref(), form.dialect.comments),
         }
     }
@@ -114,13 +128,22 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             .chain(options.iter().map(|(key, value)| format!("{key}={value}")))
             .chain(form.dialect.options.1.iter().map(|more| word(more)))
             .collect(),
-        CardKind::Initial(values) => std::iter::once(word(".ic"))
+        CardKind::Global(nodes) => std::iter::once(word(".global"))
+            .chain(nodes.iter().map(|node| form.name(*node)))
+            .collect(),
+        CardKind::Initial(values) | CardKind::Guess(values) => {
+            std::iter::once(word(if matches!(kind, CardKind::Guess(_)) {
+                ".nodeset"
+            } else {
+                ".ic"
+            }))
             .chain(
                 values
                     .iter()
                     .map(|(node, expr)| format!("v({})={}", form.name(*node), value(form, expr))),
             )
-            .collect(),
+            .collect()
+        }
         CardKind::Save { print, items } => {
             let saves = if *print { form.dialect.print } else { form.dialect.save };
             if saves.is_empty() {
@@ -140,7 +163,10 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             words
         }
         CardKind::OperatingPoint => vec![word(".op")],
-        CardKind::Comment(_) | CardKind::Subcircuit(_) => vec![],
+        CardKind::Comment(_)
+        | CardKind::Subcircuit(_)
+        | CardKind::Choice(_)
+        | CardKind::Function(_) => vec![],
     }
 }
 

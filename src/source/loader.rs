@@ -79,10 +79,18 @@ pub fn decode(name: &str, bytes: Vec<u8>, map: &mut SourceMap) -> Result<FileId,
         Some(rest) => rest.to_vec(),
         None => bytes,
     };
+    let bytes = match utf16(&bytes) {
+        Some(text) => text.into_bytes(),
+        None => bytes,
+    };
     if let Some(offset) = bytes.iter().position(|byte| *byte == 0) {
         let span = show(name, &bytes, offset, map);
         return fail(LoadErrorKind::Binary { offset, span });
     }
+    let bytes = match std::str::from_utf8(&bytes) {
+        Err(_) if !name.ends_with(".bg") => latin(&bytes).into_bytes(),
+        _ => bytes,
+    };
     match String::from_utf8(bytes) {
         Ok(text) => {
             let empty = text.trim().is_empty();
@@ -98,6 +106,46 @@ pub fn decode(name: &str, bytes: Vec<u8>, map: &mut SourceMap) -> Result<FileId,
             fail(LoadErrorKind::NotUtf8 { offset, span })
         }
     }
+}
+
+/// The text of bytes that a byte order mark says to be UTF-16, as LTspice writes netlists; also of those without one whose
+/// first letter says so.
+fn utf16(bytes: &[u8]) -> Option<String> {
+    let unit = |pair: &[u8], big: bool| match pair {
+        [a, b] if big => u16::from_be_bytes([*a, *b]),
+        [a, b] => u16::from_le_bytes([*a, *b]),
+        _ => 0xFFFD,
+    };
+    let (big, from) = match bytes {
+        [0xFF, 0xFE, ..] => (false, 2),
+        [0xFE, 0xFF, ..] => (true, 2),
+        [b'*', 0, ..] => (false, 0),
+        _ => return None,
+    };
+    let units = bytes[from..].chunks(2).map(|pair| unit(pair, big));
+    Some(char::decode_utf16(units).map(|letter| letter.unwrap_or('\u{FFFD}')).collect())
+}
+
+/// The text of bytes that are one letter each, as older programs write netlists (Latin-1): `µ` is 0xB5.
+fn latin(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| char::from(*byte)).collect()
+}
+
+/// Whether something that can be read has this name.
+pub fn is_file(path: &str) -> bool {
+    // A folder is one that cannot be read, and is said to be.
+    Path::new(path).exists()
+}
+
+/// Whether a path stays within a folder, links followed. Of what does not exist, whether its folder does.
+pub fn lies_within(path: &str, folder: &str) -> bool {
+    let Ok(folder) = Path::new(folder).canonicalize() else { return false };
+    let path = Path::new(path);
+    let whole = path.canonicalize().or_else(|_| {
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        parent.unwrap_or(Path::new(".")).canonicalize()
+    });
+    whole.is_ok_and(|whole| whole.starts_with(&folder))
 }
 
 /// Reads a whole file of data; `-` is standard input.

@@ -200,7 +200,9 @@ mod tests {
 
     #[test]
     fn every_function_has_a_row_with_its_arguments() {
-        for function in FUNCTIONS.iter().filter(|row| !matches!(row.name, "abspow" | "signpow")) {
+        for function in
+            FUNCTIONS.iter().filter(|row| !matches!(row.name, "abspow" | "signpow" | "realpow"))
+        {
             let row = agreement(function.name).unwrap_or_else(|| panic!("{}", function.name));
             assert_eq!(row.arguments.len(), function.value.arguments(), "{}", function.name);
         }

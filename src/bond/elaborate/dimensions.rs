@@ -129,15 +129,16 @@ impl<'w, 'a> Walk<'w, 'a> {
                 let (x, y) = (self.dimension(a), self.dimension(b));
                 self.operation(*op, expr, (a, x), (b, y))
             }
-            Node::Call(Function::PowerOfAbs | Function::SignedPower, arguments) => {
-                match arguments.as_slice() {
-                    [a, b] => {
-                        let (x, y) = (self.dimension(a), self.dimension(b));
-                        self.operation(Binary::Power, expr, (a, x), (b, y))
-                    }
-                    _ => Dim::Unknown,
+            Node::Call(
+                Function::PowerOfAbs | Function::SignedPower | Function::RealPower,
+                arguments,
+            ) => match arguments.as_slice() {
+                [a, b] => {
+                    let (x, y) = (self.dimension(a), self.dimension(b));
+                    self.operation(Binary::Power, expr, (a, x), (b, y))
                 }
-            }
+                _ => Dim::Unknown,
+            },
             Node::Call(function, arguments) => {
                 let found: Vec<Dim> = arguments.iter().map(|a| self.dimension(a)).collect();
                 if found.iter().all(|dim| *dim == Dim::Bare) {

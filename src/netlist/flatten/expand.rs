@@ -4,7 +4,7 @@ use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::values::near;
 use crate::circuit::{DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::{Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
+use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
 
@@ -25,6 +25,10 @@ pub struct Flat<'n> {
     pub nodes: Vec<Node>,
     /// Devices in order.
     pub devices: Vec<Pending<'n>>,
+    /// The cards outside of subcircuits, one branch of each `.if` in its place.
+    pub live: Vec<&'n Card>,
+    /// `.nodeset` values with their scopes.
+    pub guesses: Vec<(ScopeId, Name, &'n Expr, Span)>,
     /// `.ic` values with their scopes.
     pub initial: Vec<(ScopeId, Name, &'n Expr, Span)>,
 }
@@ -52,16 +56,20 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         nodes: vec![ground],
         devices: Vec::with_capacity(netlist.cards.len()),
         initial: vec![],
+        live: vec![],
+        guesses: vec![],
     };
     flat.scopes.all.push(Scope::default());
     let mut expander =
         Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
-    let given = definitions(&mut expander.flat, TOP, &netlist.cards, d);
+    globals(&mut expander.flat.scopes.globals, &netlist.cards);
+    let (live, given) = expander.choose(TOP, &netlist.cards, &[], d);
     expander.flat.scopes.get_mut(TOP).written =
         given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
-    expander.body(TOP, &netlist.cards, d);
-    let flat = expander.flat;
+    expander.body(TOP, &live, d);
+    let mut flat = expander.flat;
+    flat.live = live;
     if flat.devices.is_empty() && !crate::diagnostic::has_errors(d) {
         d.push(
             Diagnostic::error("E0734", Span::NONE, "the netlist holds no device")
@@ -79,11 +87,36 @@ struct Expander<'n> {
     full: bool,
 }
 
+/// Parameters in their order, with what they are defined by.
+type Given<'n> = Vec<(Name, &'n Expr)>;
+
+/// Nodes of `.global`, wherever it stands.
+fn globals(found: &mut Table<()>, cards: &[Card]) {
+    for card in cards {
+        match &card.kind {
+            CardKind::Global(nodes) => found.extend(nodes.iter().map(|node| (*node, ()))),
+            CardKind::Subcircuit(subcircuit) => globals(found, &subcircuit.cards),
+            CardKind::Choice(branches) => {
+                branches.iter().for_each(|branch| globals(found, &branch.cards));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn parameters_of<'n>(card: &'n Card) -> impl Iterator<Item = (Name, &'n Expr)> {
+    let parameters = match &card.kind {
+        CardKind::Parameters(parameters) => parameters.as_slice(),
+        _ => &[],
+    };
+    parameters.iter().map(|(name, expr)| (*name, expr))
+}
+
 /// Notes models and subcircuits of a body; gives its `.param`s.
 fn definitions<'n>(
     flat: &mut Flat<'n>,
     id: ScopeId,
-    cards: &'n [Card],
+    cards: &[&'n Card],
     d: &mut Vec<Diagnostic>,
 ) -> Vec<(Name, &'n Expr)> {
     let names = &flat.netlist.names;
@@ -124,14 +157,66 @@ fn twice(what: &str, name: &str, span: Span, first: Span) -> Diagnostic {
 }
 
 impl<'n> Expander<'n> {
-    fn body(&mut self, id: ScopeId, cards: &'n [Card], d: &mut Vec<Diagnostic>) {
-        for card in cards {
+    /// The cards of a body that count, one branch of each `.if` put in its place, and the parameters that they define behind
+    /// those that are given. A condition may use every parameter that stands outside of choices or in a branch before it.
+    fn choose<'a>(
+        &mut self,
+        id: ScopeId,
+        cards: &'n [Card],
+        outer: &[(Name, &'a Expr)],
+        d: &mut Vec<Diagnostic>,
+    ) -> (Vec<&'n Card>, Given<'a>)
+    where
+        'n: 'a,
+    {
+        let mut live: Vec<&'n Card> = cards.iter().collect();
+        let is_choice = |card: &&Card| matches!(card.kind, CardKind::Choice(_));
+        let mut known = false;
+        while let Some(at) = live.iter().position(is_choice) {
+            let card = live[at];
+            let CardKind::Choice(branches) = &card.kind else { break };
+            if !known {
+                let given: Given<'a> = outer
+                    .iter()
+                    .copied()
+                    .chain(live.iter().flat_map(|card| parameters_of(card)))
+                    .collect();
+                self.flat.scopes.get_mut(id).parameters.clear();
+                // What is unknown as yet may stand in a branch; what stays unknown is said at the end.
+                let names = &self.flat.netlist.names;
+                scope::parameters(&mut self.flat.scopes, id, &given, names, &mut vec![]);
+            }
+            let names = &self.flat.netlist.names;
+            let holds = |branch: &&Branch| match &branch.condition {
+                Some(condition) => {
+                    let value = scope::number(&self.flat.scopes, id, condition, names, d);
+                    value.is_some_and(|value| value != 0.0)
+                }
+                None => true,
+            };
+            let mut chosen = vec![];
+            if let Some(branch) = branches.iter().find(holds) {
+                chosen.extend(branch.cards.iter());
+            }
+            known = !chosen.iter().any(|card| matches!(card.kind, CardKind::Parameters(_)));
+            live.splice(at..=at, chosen);
+        }
+        self.flat.scopes.get_mut(id).parameters.clear();
+        let mut given: Given<'a> = outer.to_vec();
+        given.extend(definitions(&mut self.flat, id, &live, d));
+        (live, given)
+    }
+
+    fn body(&mut self, id: ScopeId, cards: &[&'n Card], d: &mut Vec<Diagnostic>) {
+        for &card in cards {
             match &card.kind {
                 CardKind::Device(device) => self.device(id, card, device, d),
-                CardKind::Initial(values) => {
-                    self.flat
-                        .initial
-                        .extend(values.iter().map(|(node, value)| (id, *node, value, card.span)));
+                CardKind::Initial(values) | CardKind::Guess(values) => {
+                    let kept = match card.kind {
+                        CardKind::Initial(_) => &mut self.flat.initial,
+                        _ => &mut self.flat.guesses,
+                    };
+                    kept.extend(values.iter().map(|(node, value)| (id, *node, value, card.span)));
                 }
                 CardKind::Options(_)
                 | CardKind::Save { .. }
@@ -157,6 +242,10 @@ impl<'n> Expander<'n> {
             return NodeId(0);
         }
         let (scopes, nodes) = (&mut self.flat.scopes, &mut self.flat.nodes);
+        let id = match scopes.globals.contains_key(&name) {
+            true if !scopes.get(id).nodes.contains_key(&name) => TOP,
+            _ => id,
+        };
         let Scope { nodes: known, path, .. } = scopes.get_mut(id);
         *known.entry(name).or_insert_with(|| {
             let text = self.flat.netlist.names.text(name);
@@ -272,7 +361,7 @@ impl<'n> Expander<'n> {
         for (port, node) in subcircuit.ports.iter().zip(nodes) {
             table.insert(*port, *node);
         }
-        let mut values: Vec<(Name, Expr)> = vec![];
+        let (mut values, mut varying): (Vec<(Name, Expr)>, Vec<Name>) = (vec![], vec![]);
         for (name, expr) in parameters {
             if !subcircuit.parameters.iter().any(|(own, _)| own == name) {
                 let text = names.text(*name);
@@ -288,6 +377,10 @@ impl<'n> Expander<'n> {
                     None => error,
                 });
             }
+            if scope::varies(&self.flat.scopes, id, expr) {
+                varying.push(*name);
+                continue;
+            }
             let value = scope::number(&self.flat.scopes, id, expr, names, d).unwrap_or(f64::NAN);
             values.push((*name, Expr::new(crate::expr::Node::Number(value), expr.span)));
         }
@@ -299,17 +392,22 @@ impl<'n> Expander<'n> {
             nodes: table,
             ..Scope::default()
         });
-        let own = definitions(&mut self.flat, inner, &subcircuit.cards, d);
+        self.flat.scopes.get_mut(inner).varying.extend(varying.iter().map(|name| (*name, ())));
+        let outer: Vec<(Name, &Expr)> = (subcircuit.parameters.iter())
+            .filter(|(name, _)| !varying.contains(name))
+            .chain(&values)
+            .map(|(name, expr)| (*name, expr))
+            .collect();
+        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, d);
+        let own = live.iter().flat_map(|card| parameters_of(card));
         let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
             .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))
-            .chain(own.iter().map(|(name, expr)| (*name, (inner, *expr))));
+            .chain(own.map(|(name, expr)| (name, (inner, expr))));
         self.flat.scopes.get_mut(inner).written = written.collect();
-        let defaults = subcircuit.parameters.iter().map(|(name, expr)| (*name, expr));
-        let given: Vec<_> =
-            defaults.chain(values.iter().map(|(name, expr)| (*name, expr))).chain(own).collect();
+        let names = &self.flat.netlist.names;
         scope::parameters(&mut self.flat.scopes, inner, &given, names, d);
         self.chain.push(subcircuit);
-        self.body(inner, &subcircuit.cards, d);
+        self.body(inner, &live, d);
         self.chain.pop();
     }
 }

@@ -5,11 +5,11 @@ use super::kinds;
 use super::scope::{self, TOP};
 use super::values::Lookup;
 use crate::circuit::{Analysis, Circuit, NodeId, Output};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
-use crate::netlist::{CardKind, Expr};
+use crate::netlist::{CardKind, Expr, Name};
 use crate::source::{FileId, Span};
 use std::collections::{HashMap, HashSet};
 
@@ -20,7 +20,7 @@ pub fn settings(
     d: &mut Vec<Diagnostic>,
 ) -> (Vec<Analysis>, Vec<(String, String)>) {
     let (mut analyses, mut options) = (vec![], vec![]);
-    for card in &flat.netlist.cards {
+    for card in &flat.live {
         match &card.kind {
             CardKind::Options(given) => options.extend(given.iter().cloned()),
             CardKind::OperatingPoint => analyses.push(Analysis::OperatingPoint),
@@ -60,20 +60,14 @@ pub fn readings(
     d: &mut Vec<Diagnostic>,
 ) -> (Vec<Output>, Vec<(NodeId, f64)>) {
     let lookup = Lookup::new(flat, &flat.netlist.names);
-    let mut initial = vec![];
-    for (id, name, expr, span) in &flat.initial {
-        let (node, value) = (lookup.node(*id, *name, *span, d), lookup.number(*id, expr, d));
-        if let (Some(node), Some(value)) = (node, value) {
-            initial.push((node, value));
-        }
-    }
+    let initial = voltages(&lookup, &flat.initial, d);
     let mut outputs = vec![];
     if !header.columns.is_empty() {
         columns(flat, header, &mut outputs, d);
         return (outputs, initial);
     }
     let mut seen = HashSet::new();
-    for card in &flat.netlist.cards {
+    for card in &flat.live {
         let CardKind::Save { items, .. } = &card.kind else { continue };
         if items.is_empty() {
             // `.save all`
@@ -88,6 +82,31 @@ pub fn readings(
         }
     }
     (outputs, initial)
+}
+
+/// Where to look for an operating point: `.nodeset`. Nodes that are not there are passed over, with a warning.
+pub fn guesses(flat: &Flat, d: &mut Vec<Diagnostic>) -> Vec<(NodeId, f64)> {
+    let lookup = Lookup::new(flat, &flat.netlist.names);
+    let mut found = vec![];
+    let guesses = voltages(&lookup, &flat.guesses, &mut found);
+    d.extend(found.into_iter().map(|error| match error.code {
+        "E0740" => Diagnostic { code: "W0705", severity: Severity::Warning, ..error },
+        _ => error,
+    }));
+    guesses
+}
+
+fn voltages(
+    lookup: &Lookup,
+    given: &[(scope::ScopeId, Name, &Expr, Span)],
+    d: &mut Vec<Diagnostic>,
+) -> Vec<(NodeId, f64)> {
+    let mut found = vec![];
+    for (id, name, expr, span) in given {
+        let (node, value) = (lookup.node(*id, *name, *span, d), lookup.number(*id, expr, d));
+        found.extend(node.zip(value));
+    }
+    found
 }
 
 /// The columns of the header. Their expressions stand in no text that a message could point at.

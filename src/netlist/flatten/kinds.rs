@@ -1,12 +1,13 @@
 //! The second pass: what each device is.
 
 use super::expand::{Flat, Pending};
+use super::scope;
 use super::sources::{self, Times};
 use super::values::Lookup;
 use crate::circuit::{self, Device, DeviceKind, DiodeModel, NodeId, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
-use crate::netlist::{Element, Expr, Name};
+use crate::netlist::{Element, Expr, Name, Source, Waveform};
 use crate::quantity::nearest;
 
 /// Every device of a flat netlist. One that is wrong becomes a resistor, with an error, so that the others keep their
@@ -82,6 +83,17 @@ fn kind(
             let first = lookup.device(scope, first, span, d);
             let second = lookup.device(scope, second, span, d);
             DeviceKind::Mutual { inductors: [first?, second?], coupling: number(coupling, d)? }
+        }
+        // A value that changes with time, or follows from others, is a law.
+        Element::VoltageSource(Source { waveform: Waveform::Constant(law), .. })
+            if scope::varies(&lookup.flat.scopes, scope, law) =>
+        {
+            DeviceKind::BehaviouralVoltage { law: lookup.law(scope, law, d)? }
+        }
+        Element::CurrentSource(Source { waveform: Waveform::Constant(law), .. })
+            if scope::varies(&lookup.flat.scopes, scope, law) =>
+        {
+            DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }
         }
         Element::VoltageSource(source) => {
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);

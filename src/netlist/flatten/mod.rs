@@ -29,12 +29,14 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
     let times = sources::Times::of(&analyses);
     let devices = kinds::resolve(&flat, &header, times, diagnostics);
+    let guesses = experiment::guesses(&flat, diagnostics);
     let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
     let mut circuit = Circuit {
         title: netlist.title.clone(),
         nodes: flat.nodes,
         devices,
         initial,
+        guesses,
         analyses,
         outputs,
         options,

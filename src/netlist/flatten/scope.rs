@@ -48,7 +48,9 @@ pub struct Scope<'n> {
     pub parent: Option<ScopeId>,
     /// Parameters as numbers.
     pub parameters: Table<f64>,
-    /// The same as they are written, and the scope whose words they use.
+    /// Those that change during the run: they stand in laws as they are written.
+    pub varying: Table<()>,
+    /// Both as they are written, and the scope whose words they use.
     pub written: Table<(ScopeId, &'n Expr)>,
     /// Nodes.
     pub nodes: Table<NodeId>,
@@ -65,6 +67,8 @@ pub struct Scope<'n> {
 pub struct Scopes<'n> {
     /// By [`ScopeId`].
     pub all: Vec<Scope<'n>>,
+    /// Nodes that are one in every scope.
+    pub globals: Table<()>,
 }
 
 /// The top of the netlist.
@@ -86,10 +90,31 @@ impl<'n> Scopes<'n> {
         std::iter::successors(Some(id), |id| self.get(*id).parent).map(|id| (id, self.get(id)))
     }
 
+    /// The scope of a parameter that changes during the run, where a name is one.
+    pub fn varying(&self, id: ScopeId, name: Name) -> Option<ScopeId> {
+        let known = |(_, scope): &(ScopeId, &Scope)| {
+            scope.varying.contains_key(&name) || scope.parameters.contains_key(&name)
+        };
+        let (place, scope) = self.around(id).find(known)?;
+        scope.varying.contains_key(&name).then_some(place)
+    }
+
     /// The value of a parameter, here or around.
     pub fn parameter(&self, id: ScopeId, name: Name) -> Option<f64> {
         self.around(id).find_map(|(_, scope)| scope.parameters.get(&name).copied())
     }
+}
+
+/// Whether an expression changes during the run: it speaks of time, a voltage or a current, itself or through a parameter.
+pub fn varies(scopes: &Scopes, id: ScopeId, expr: &Expr) -> bool {
+    let mut found = false;
+    expr.leaves(&mut |leaf, _| {
+        found |= match leaf {
+            Leaf::Parameter(name) => scopes.varying(id, *name).is_some(),
+            _ => true,
+        }
+    });
+    found
 }
 
 /// Constants that need no `.param`.
@@ -120,7 +145,10 @@ pub fn parameters(
         let mut chain = vec![*name];
         while let Some(top) = chain.last().copied() {
             let known = |name: &Name| {
-                scopes.get(id).parameters.contains_key(name) || failed.contains_key(name)
+                let own = scopes.get(id);
+                own.parameters.contains_key(name)
+                    || own.varying.contains_key(name)
+                    || failed.contains_key(name)
             };
             let Some(expr) = wanted.get(&top).filter(|_| !known(&top)) else {
                 chain.pop();
@@ -154,6 +182,10 @@ pub fn parameters(
                     }
                     None => chain.push(used),
                 },
+                None if !failed_within(expr, &failed) && varies(scopes, id, expr) => {
+                    scopes.get_mut(id).varying.insert(top, ());
+                    chain.pop();
+                }
                 None => {
                     let value = if failed_within(expr, &failed) {
                         None
@@ -175,7 +207,10 @@ pub fn parameters(
     }
     // What failed has been reported; its users need no report of their own.
     for (name, _) in given {
-        scopes.get_mut(id).parameters.entry(*name).or_insert(f64::NAN);
+        let own = scopes.get_mut(id);
+        if !own.varying.contains_key(name) {
+            own.parameters.entry(*name).or_insert(f64::NAN);
+        }
     }
 }
 
@@ -203,6 +238,13 @@ pub fn number(
     let (mut wrong, look) = (None, super::values::near(d));
     expr.leaves(&mut |leaf, span| {
         let error = match leaf {
+            Leaf::Parameter(name) if scopes.varying(id, *name).is_some() => {
+                let text = names.text(*name);
+                Some(
+                    Diagnostic::error("E0732", span, "this value must be a number")
+                        .says(format!("`{text}` changes during the run")),
+                )
+            }
             Leaf::Parameter(name) => {
                 let known =
                     scopes.parameter(id, *name).is_some() || constant(names.text(*name)).is_some();

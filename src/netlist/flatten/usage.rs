@@ -13,8 +13,14 @@ pub fn check(netlist: &Netlist, header: &Header, d: &mut Vec<Diagnostic>) {
         // It comes from a bond graph, where a signal that nothing reads is no slip: an output of a model, say.
         return;
     }
+    let cards = every(&netlist.cards);
+    let globals = cards.iter().filter_map(|card| match &card.kind {
+        CardKind::Global(nodes) => Some(nodes.iter().copied()),
+        _ => None,
+    });
+    let globals = globals.flatten().collect();
     let mut usage =
-        Usage { found: 0, scope: 0, last: 0, counts: vec![(0, 0); netlist.names.len()] };
+        Usage { globals, found: 0, scope: 0, last: 0, counts: vec![(0, 0); netlist.names.len()] };
     // Domains of the header name nodes too; what they name is meant.
     let nodes = header.domains.iter().flat_map(|domain| &domain.nodes);
     let meant: Vec<Name> = nodes.filter_map(|name| netlist.names.find(name)).collect();
@@ -28,7 +34,23 @@ pub fn check(netlist: &Netlist, header: &Header, d: &mut Vec<Diagnostic>) {
 /// As many are named; of a big deck nobody reads more.
 const MOST: usize = 20;
 
+/// The cards of a block, those of every branch of its choices too.
+fn every(cards: &[Card]) -> Vec<&Card> {
+    let mut found = vec![];
+    for card in cards {
+        match &card.kind {
+            CardKind::Choice(branches) => {
+                found.extend(branches.iter().flat_map(|branch| every(&branch.cards)));
+            }
+            _ => found.push(card),
+        }
+    }
+    found
+}
+
 struct Usage {
+    /// Nodes that are one everywhere.
+    globals: Vec<Name>,
     found: usize,
     scope: u32,
     last: u32,
@@ -70,7 +92,8 @@ impl Usage {
         for name in meant.iter().chain(meant) {
             self.count(*name);
         }
-        for card in cards {
+        let within = every(cards);
+        for card in &within {
             match &card.kind {
                 CardKind::Device(device) => {
                     device.nodes.iter().for_each(|node| self.count(*node));
@@ -85,14 +108,20 @@ impl Usage {
                         _ => {}
                     }
                 }
-                CardKind::Initial(values) => values.iter().for_each(|(node, _)| self.count(*node)),
+                CardKind::Initial(values) | CardKind::Guess(values) => {
+                    values.iter().for_each(|(node, _)| self.count(*node));
+                }
+                // Once more, for what stands elsewhere.
+                CardKind::Global(nodes) => {
+                    nodes.iter().chain(nodes).for_each(|node| self.count(*node));
+                }
                 CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| self.expr(expr)),
                 _ => {}
             }
         }
         let once =
             |counts: &[(u32, u8)], name: &Name| counts.get(name.0 as usize) == Some(&(own, 1));
-        for card in cards {
+        for card in &within {
             let CardKind::Device(device) = &card.kind else { continue };
             if matches!(device.element, Element::Instance { .. }) {
                 // An output of a subcircuit that nobody needs.
@@ -107,10 +136,12 @@ impl Usage {
                 }
             }
         }
-        for card in cards {
+        for card in &within {
             if let CardKind::Subcircuit(subcircuit) = &card.kind {
                 // A terminal is named outside as well.
-                self.scope(netlist, &subcircuit.cards, &subcircuit.ports, d);
+                let meant: Vec<Name> =
+                    subcircuit.ports.iter().chain(&self.globals).copied().collect();
+                self.scope(netlist, &subcircuit.cards, &meant, d);
             }
         }
     }

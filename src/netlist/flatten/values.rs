@@ -77,11 +77,15 @@ impl<'f, 'n> Lookup<'f, 'n> {
             return Some(NodeId(0));
         }
         let scope = self.flat.scopes.get(id);
-        if let Some(node) = scope.nodes.get(&name) {
+        let global = || {
+            let known = self.flat.scopes.globals.contains_key(&name);
+            known.then(|| self.flat.scopes.get(scope::TOP).nodes.get(&name)).flatten()
+        };
+        if let Some(node) = scope.nodes.get(&name).or_else(global) {
             return Some(*node);
         }
-        if text.contains('.') {
-            let path = format!("{}{text}", scope.path).to_lowercase();
+        if text.contains(['.', ':']) {
+            let path = format!("{}{}", scope.path, text.replace(':', ".")).to_lowercase();
             if let Some(node) = self.paths().nodes.get(&path) {
                 return Some(*node);
             }
@@ -119,6 +123,7 @@ impl<'f, 'n> Lookup<'f, 'n> {
         if let Some(device) = scope.devices.get(&name).filter(here) {
             return Some(*device);
         }
+        let text = &text.replace(':', ".");
         if let Some((first, rest)) = text.split_once('.') {
             let path = format!("{}{text}", scope.path).to_lowercase();
             let short = format!("{}{rest}", scope.path).to_lowercase();
@@ -149,11 +154,22 @@ impl<'f, 'n> Lookup<'f, 'n> {
         pending.is_some_and(|pending| matches!(pending.device.element, Element::Mutual { .. }))
     }
 
+    /// A parameter that changes during the run, as it is written.
+    fn varying(&self, id: ScopeId, name: Name, d: &mut Vec<Diagnostic>) -> circuit::Expr {
+        let place = self.flat.scopes.varying(id, name);
+        let written = place.and_then(|place| self.flat.scopes.get(place).written.get(&name));
+        let law = written.and_then(|(place, expr)| self.law(*place, expr, d));
+        law.unwrap_or(circuit::Expr::number(f64::NAN))
+    }
+
     /// An expression of a scope over nodes and devices.
     pub fn law(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<circuit::Expr> {
         let before = d.len();
         let law = expr.map(&mut |leaf, span| {
             let node = match leaf {
+                Leaf::Parameter(name) if self.flat.scopes.varying(id, *name).is_some() => {
+                    return self.varying(id, *name, d);
+                }
                 Leaf::Parameter(name) => {
                     let value = self
                         .flat

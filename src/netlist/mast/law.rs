@@ -258,6 +258,12 @@ impl Writer {
                 let size = self.named(&call(Abs, a), before);
                 sign * self.power(&size, b, before)
             }
+            (RealPower, [a, b]) => {
+                let size = || Expr::call(PowerOfAbs, vec![a.clone(), b.clone()]);
+                let turn = call(Cos, Expr::number(std::f64::consts::PI) * b.clone());
+                let below = a.clone().binary(Binary::Less, Expr::number(0.0));
+                self.formula(&Expr::choice(below, size() * turn, size()), before)
+            }
             _ => {
                 let arguments = arguments.iter().map(|a| self.formula(a, before)).collect();
                 Expr::call(function, arguments)

@@ -286,6 +286,10 @@ impl<'a> Writer<'a> {
             }
             // What can be asked of a simulator is said at the top; instances of subcircuits are refused.
             CardKind::Subcircuit(_)
+            | CardKind::Choice(_)
+            | CardKind::Function(_)
+            | CardKind::Global(_)
+            | CardKind::Guess(_)
             | CardKind::Model { .. }
             | CardKind::Options(_)
             | CardKind::Save { .. }

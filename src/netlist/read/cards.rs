@@ -1,9 +1,10 @@
-//! Cards that begin with a dot.
+//! Cards that begin with a dot, but those that hold others (`blocks`) or name files (`pile`).
 
+use super::options::options;
 use super::{Cursor, Reader};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
-use crate::netlist::{CardKind, Expr, Leaf, Subcircuit};
+use crate::netlist::{CardKind, Definition, Expr, Leaf, Name, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
 
@@ -20,10 +21,9 @@ pub enum Treatment {
 use Treatment::{Read, Refused, Skipped};
 
 const ANALYSIS: &str = "this analysis is not computed yet";
-const ONE_FILE: &str = "netlists of several files are not read yet: paste the text in";
 const RESULT: &str = "it only asks for a result that is not computed here";
 
-/// Every card but `.title`, `.subckt`, `.ends`, `.control` and `.end`, which the reader itself knows.
+/// Every card but those that the reader itself knows.
 #[rustfmt::skip]
 pub const CARDS: &[(&str, Treatment)] = &[
     ("param", Read(parameters)),
@@ -33,12 +33,18 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("options", Read(options)),
     ("option", Read(options)),
     ("opt", Read(options)),
-    ("ic", Read(initial)),
+    ("ic", Read(|reader, cursor| Some(CardKind::Initial(voltages(reader, cursor)?)))),
+    ("dcvolt", Read(|reader, cursor| Some(CardKind::Initial(voltages(reader, cursor)?)))),
+    ("initcond", Read(|reader, cursor| Some(CardKind::Initial(voltages(reader, cursor)?)))),
+    ("nodeset", Read(|reader, cursor| Some(CardKind::Guess(voltages(reader, cursor)?)))),
+    ("func", Read(function)),
+    ("global", Read(global)),
+    ("temp", Read(temperature)),
+    ("preprocess", Read(preprocess)),
     ("save", Read(|reader, cursor| save(reader, cursor, false))),
     ("print", Read(|reader, cursor| save(reader, cursor, true))),
     ("tran", Read(transient)),
     ("op", Read(|_, _| Some(CardKind::OperatingPoint))),
-    ("nodeset", Skipped("it is a hint for another solver's operating point")),
     ("plot", Skipped(RESULT)),
     ("probe", Skipped(RESULT)),
     ("four", Skipped(RESULT)),
@@ -53,17 +59,13 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("noise", Refused(ANALYSIS)),
     ("disto", Refused(ANALYSIS)),
     ("step", Refused(ANALYSIS)),
-    ("include", Refused(ONE_FILE)),
-    ("inc", Refused(ONE_FILE)),
-    ("lib", Refused(ONE_FILE)),
-    ("func", Refused("functions of one's own are not read yet: write their expressions out")),
-    ("global", Refused("global nodes are not read yet: hand the node over as a terminal")),
     ("csparam", Refused("it belongs to ngspice's command language")),
-    ("temp", Refused("every circuit is at 27 °C")),
-    ("if", Refused("conditional netlists are not read yet")),
-    ("elseif", Refused("conditional netlists are not read yet")),
-    ("else", Refused("conditional netlists are not read yet")),
-    ("endif", Refused("conditional netlists are not read yet")),
+];
+
+/// The cards that the reader itself knows.
+const OTHERS: &[&str] = &[
+    "subckt", "ends", "if", "elseif", "else", "endif", "include", "inc", "lib", "endl", "end",
+    "control", "title",
 ];
 
 /// The card of a line, whose keyword has been read.
@@ -90,10 +92,7 @@ pub fn card(reader: &mut Reader, cursor: &mut Cursor, span: Span) -> Option<Card
         }
         None => {
             let error = Diagnostic::error("E0701", place, format!("unknown card `.{keyword}`"));
-            let known = CARDS
-                .iter()
-                .map(|(name, _)| *name)
-                .chain(["subckt", "ends", "end", "control", "title"]);
+            let known = CARDS.iter().map(|(name, _)| *name).chain(OTHERS.iter().copied());
             reader.diagnostics.push(match nearest(&keyword, known) {
                 Some(name) => error.help(format!("did you mean `.{name}`?")),
                 None => error,
@@ -129,40 +128,137 @@ pub fn subcircuit(reader: &mut Reader, cursor: &mut Cursor) -> Option<Subcircuit
     Some(Subcircuit { name: reader.name(word), ports, parameters, cards: vec![] })
 }
 
-/// `.param name=value name={expression} …`; a value may also be an expression with blanks, up to the next `name=`.
+/// `.param name=value name={expression} f(x)={expression} …`; a value may also be an expression with blanks, up to the
+/// next `name=`.
 fn parameters(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     let mut parameters = vec![];
+    let mut functions = false;
     while !cursor.is_done() {
         let Some(key) = cursor.key() else {
+            let mut ahead = *cursor;
+            let word = ahead.word();
+            if !word.0.is_empty() && ahead.peek() == Some(b'(') {
+                *cursor = ahead;
+                let definition = definition(reader, cursor, word)?;
+                reader.functions.push(definition);
+                functions = true;
+                continue;
+            }
             let (word, from) = cursor.word();
-            let call = cursor.peek() == Some(b'(');
             let span = cursor.span(reader, from, from + word.len().max(1));
-            let error = if call {
-                Diagnostic::error(
-                    "E0702",
-                    span,
-                    format!("`{word}` is a function, and those are not read yet"),
-                )
-            } else {
-                Diagnostic::error("E0703", span, "`name=value` is missing")
-            };
+            let error = Diagnostic::error("E0703", span, "`name=value` is missing");
             reader.diagnostics.push(error);
             cursor.at = cursor.text.len();
             return None;
         };
         let name = reader.name(key);
-        cursor.blanks();
-        let (from, to) = (cursor.at, before_next_key(cursor));
-        cursor.at = to;
-        let text = cursor.text[from..to].trim_end_matches([' ', '\t', ',']);
-        let value = reader.grouped(cursor, from, from + text.len());
+        let value = assigned(reader, cursor);
         parameters.push((name, value?));
     }
-    if parameters.is_empty() {
+    if parameters.is_empty() && !functions {
         reader.missing(cursor, "`name=value`");
         return None;
     }
-    Some(CardKind::Parameters(parameters))
+    (!parameters.is_empty()).then_some(CardKind::Parameters(parameters))
+}
+
+/// The value behind `name=`, up to the next `name=`.
+fn assigned(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
+    cursor.blanks();
+    let (from, to) = (cursor.at, before_next_key(cursor));
+    cursor.at = to;
+    let text = cursor.text[from..to].trim_end_matches([' ', '\t', ',']);
+    reader.grouped(cursor, from, from + text.len())
+}
+
+/// `.func name(x, y) {expression}`.
+fn function(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let word = cursor.word();
+    if word.0.is_empty() {
+        reader.missing(cursor, "the name of the function");
+        return None;
+    }
+    cursor.blanks();
+    let definition = definition(reader, cursor, word)?;
+    Some(CardKind::Function(definition))
+}
+
+/// Arguments in brackets, perhaps `=`, and the value of a function.
+fn definition(reader: &mut Reader, cursor: &mut Cursor, word: (&str, usize)) -> Option<Definition> {
+    let span = cursor.span(reader, word.1, word.1 + word.0.len());
+    if !cursor.take(b'(') {
+        reader.missing(cursor, "the arguments of the function, `f(x, y)`,");
+        return None;
+    }
+    let mut arguments: Vec<&str> = vec![];
+    while !cursor.take(b')') {
+        let (argument, _) = cursor.word();
+        if argument.is_empty() {
+            reader.missing(cursor, "`)`");
+            return None;
+        }
+        arguments.push(argument);
+    }
+    cursor.take(b'=');
+    let name = reader.name(word);
+    let before = reader.calls.len();
+    let body = assigned(reader, cursor)?;
+    // Names that nobody else has, so that nothing else is taken for an argument.
+    let own: Vec<(Name, Name)> = arguments
+        .iter()
+        .map(|argument| {
+            let unique = format!("{argument}\u{2}{}", span.start);
+            (reader.names.intern(argument), reader.names.intern(&unique))
+        })
+        .collect();
+    let body = reader.calls.rename(before, &body, &own);
+    reader.defined = true;
+    Some(Definition { name, arguments: own.into_iter().map(|(_, own)| own).collect(), body, span })
+}
+
+/// `.global node …`.
+fn global(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let mut nodes = vec![];
+    while !cursor.is_done() {
+        nodes.push(reader.node(cursor, "a node")?);
+    }
+    if nodes.is_empty() {
+        reader.missing(cursor, "a node");
+        return None;
+    }
+    Some(CardKind::Global(nodes))
+}
+
+/// `.temp celsius`.
+fn temperature(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let value = reader.value(cursor, "the temperature in °C")?;
+    let Some(celsius) = value.constant() else {
+        let error = Diagnostic::error("E0732", value.span, "the temperature must be a number");
+        reader.diagnostics.push(error);
+        return None;
+    };
+    if !cursor.is_done() {
+        let span = cursor.here(reader);
+        let warning = Diagnostic::warning("W0703", span, "only the first temperature is run");
+        reader.diagnostics.push(warning.help("a list of them: .step temp list 27 85"));
+        cursor.at = cursor.text.len();
+    }
+    Some(CardKind::Options(vec![("temp".into(), crate::netlist::plain(celsius))]))
+}
+
+/// `.preprocess replaceground true`, which has been seen to; what else it asks for changes no value.
+fn preprocess(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let (what, from) = cursor.word();
+    let span = cursor.span(reader, from, from + what.len().max(1));
+    cursor.at = cursor.text.len();
+    if !["replaceground", "removeunused"].iter().any(|known| known.eq_ignore_ascii_case(what)) {
+        let message = format!("`.preprocess {what}` is skipped");
+        let warning = Diagnostic::warning("W0703", span, message);
+        reader
+            .diagnostics
+            .push(warning.because("nodes without a path to ground are dealt with anyway"));
+    }
+    None
 }
 
 /// Where a value ends that the next `name=` follows, or the line's end.
@@ -179,8 +275,13 @@ fn before_next_key(cursor: &Cursor) -> usize {
                     || matches!(bytes[at - 1], b'=' | b'<' | b'>' | b'!');
                 if !compares {
                     let before = cursor.text[cursor.at..at].trim_end();
+                    // `f(x, y)=` is a key, too.
+                    let name = match before.strip_suffix(')').and_then(|_| before.rfind('(')) {
+                        Some(open) => before[..open].trim_end(),
+                        None => before,
+                    };
                     let word =
-                        before.rfind(|c: char| c.is_whitespace() || c == ',').map_or(0, |k| k + 1);
+                        name.rfind(|c: char| c.is_whitespace() || c == ',').map_or(0, |k| k + 1);
                     // A key that follows a value without a blank is no key: the expression is wrong, and says so.
                     return if word == 0 { bytes.len() } else { cursor.at + word };
                 }
@@ -214,51 +315,26 @@ fn model(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     Some(CardKind::Model { name, kind: kind.to_lowercase(), parameters })
 }
 
-/// The parts of Xyce that `.options` may name first.
-const PACKAGES: &[&str] =
-    &["timeint", "nonlin", "nonlin-tran", "device", "linsol", "output", "measure"];
-
-/// `.options [package] key=value flag …`. Numbers lose their suffixes.
-fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    let mut options = vec![];
-    if PACKAGES.contains(&cursor.next_word().to_lowercase().as_str()) {
-        cursor.word();
-    }
-    while !cursor.is_done() {
-        if let Some((key, _)) = cursor.key() {
-            let (word, from) = cursor.word();
-            if word.is_empty() {
-                reader.missing(cursor, "the value of the option");
-                return None;
-            }
-            let value = match super::number::number(word, reader.reading.numbers) {
-                Some(number) if number.end == word.len() => {
-                    let span = cursor.span(reader, from, from + word.len());
-                    reader.diagnostics.extend(super::suffix_warning(word, &number, span));
-                    crate::netlist::plain(number.value)
-                }
-                _ => word.to_lowercase(),
-            };
-            options.push((key.to_lowercase(), value));
-        } else {
-            let (flag, _) = cursor.word();
-            if flag.is_empty() {
-                return Some(CardKind::Options(options));
-            }
-            options.push((flag.to_lowercase(), "1".to_string()));
-        }
-    }
-    Some(CardKind::Options(options))
-}
-
-/// `.ic v(node)=value …`.
-fn initial(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+/// `.ic v(node)=value …`, or `node value …`.
+fn voltages(reader: &mut Reader, cursor: &mut Cursor) -> Option<Vec<(Name, Expr)>> {
     let mut values = vec![];
     while !cursor.is_done() {
         let here = cursor.here(reader);
-        let (word, _) = cursor.word();
-        if !word.eq_ignore_ascii_case("v") || !cursor.take(b'(') {
-            let error = Diagnostic::error("E0703", here, "`v(node)=value` is missing")
+        let (word, from) = cursor.word();
+        let bracket = cursor.take(b'(');
+        if !word.eq_ignore_ascii_case("v") || !bracket {
+            let mut pair = *cursor;
+            let value = pair.next_word();
+            let number = super::number::number(value, reader.reading.numbers);
+            if !bracket && !word.is_empty() && number.is_some_and(|n| n.end == value.len()) {
+                let node = reader.node_name(word);
+                values.push((node, reader.value(&mut pair, "the value")?));
+                *cursor = pair;
+                continue;
+            }
+            let span =
+                if word.is_empty() { here } else { cursor.span(reader, from, from + word.len()) };
+            let error = Diagnostic::error("E0703", span, "`v(node)=value` is missing")
                 .help("currents of inductors start at the `ic=` of their cards");
             reader.diagnostics.push(error);
             return None;
@@ -271,7 +347,7 @@ fn initial(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
         }
         values.push((node, reader.value(cursor, "the value")?));
     }
-    Some(CardKind::Initial(values))
+    Some(values)
 }
 
 /// `.tran step stop [start [hmax]] [uic]`.
@@ -296,7 +372,8 @@ fn transient(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
 }
 
 /// How Xyce's `.print` says where columns go and what they look like.
-const LAYOUT: &[&str] = &["format", "file", "width", "precision"];
+const LAYOUT: &[&str] =
+    &["format", "file", "width", "precision", "delimiter", "filter", "timescalefactor", "index"];
 
 /// `.save v(a) i(l1) {expression} node …`; `.print tran …`. No items at all mean everything.
 fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKind> {

@@ -264,12 +264,13 @@ impl Reader<'_> {
             let span = cursor.span(self, start, start + trimmed.len());
             return Some(Expr::new(Node::Number(read.value), span));
         }
-        super::expression::expression(
+        super::expression::with_calls(
             text,
             &mut self.names,
             self.dialect,
-            self.file,
-            cursor.base + from,
+            self.reading,
+            Some(&mut self.calls),
+            (self.file, cursor.base + from),
             self.diagnostics,
         )
     }

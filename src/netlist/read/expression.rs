@@ -1,6 +1,7 @@
 //! Expressions of netlists, by the shared grammar with SPICE's leaves.
 
 use super::cursor::node_name;
+use super::functions::Calls;
 use super::number;
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
@@ -31,11 +32,26 @@ pub fn expression(
     offset: usize,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Expr> {
+    with_calls(text, names, dialect, dialect.reading(), None, (file, offset), d)
+}
+
+/// The same; calls of unknown functions are noted, where there is a place for them.
+pub fn with_calls(
+    text: &str,
+    names: &mut Names,
+    dialect: &Dialect,
+    reading: Reading,
+    calls: Option<&mut Calls>,
+    (file, offset): (FileId, usize),
+    d: &mut Vec<Diagnostic>,
+) -> Option<Expr> {
     let place = |from: usize, to: usize| Span::new(file, offset + from, offset + to);
     if let Some(at) = parse::nesting(text, None) {
         d.push(parse::too_deep(place(at, at + 1)));
         return None;
     }
+    let marked = reading.colons.then(|| mark_colons(text)).flatten();
+    let text = marked.as_deref().unwrap_or(text);
     let mut pairs = match Grammar::parse(Rule::whole, text) {
         Ok(pairs) => pairs,
         Err(error) => {
@@ -43,8 +59,7 @@ pub fn expression(
             return None;
         }
     };
-    let mut language =
-        Spice { names, spelling: dialect.spelling, reading: dialect.reading(), file, offset };
+    let mut language = Spice { names, spelling: dialect.spelling, reading, calls, file, offset };
     parse::expression(&mut language, pairs.next()?, d)
 }
 
@@ -78,10 +93,71 @@ fn syntax_error(
     Diagnostic::error("E0705", span, message)
 }
 
+/// Stands for the colon of a name while the grammar reads it.
+const COLON: char = '\u{1}';
+
+/// The text with the colons of names marked: those that stand between letters without a blank, unless a `?` before still
+/// waits for its own and no other follows. `None` where there are none.
+fn mark_colons(text: &str) -> Option<String> {
+    if !text.contains(':') {
+        return None;
+    }
+    let bytes = text.as_bytes();
+    let letter =
+        |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'#' | b'@' | b'`');
+    let mut marked = text.to_string();
+    // For each open bracket, how many `?` wait for their colons.
+    let mut waiting = vec![0usize];
+    let mut word = None;
+    for at in 0..bytes.len() {
+        match bytes[at] {
+            byte if letter(byte) => {
+                word.get_or_insert(at);
+                continue;
+            }
+            b'(' | b'{' => waiting.push(0),
+            b')' | b'}' if waiting.len() > 1 => {
+                waiting.pop();
+            }
+            b'?' => *waiting.last_mut()? += 1,
+            b':' => {
+                let named = word.is_some_and(|from| !bytes[from].is_ascii_digit());
+                let goes_on = bytes.get(at + 1).is_some_and(|byte| letter(*byte));
+                let last = waiting.last_mut()?;
+                let needed = *last > 0 && colons_here(&bytes[at + 1..]) < *last;
+                if named && goes_on && !needed {
+                    marked.replace_range(at..at + 1, "\u{1}");
+                    continue;
+                }
+                *last = last.saturating_sub(1);
+            }
+            _ => {}
+        }
+        word = None;
+    }
+    Some(marked)
+}
+
+/// Colons before the bracket closes that is open.
+fn colons_here(bytes: &[u8]) -> usize {
+    let (mut depth, mut count) = (0i32, 0);
+    for byte in bytes {
+        match byte {
+            b'(' | b'{' => depth += 1,
+            b')' | b'}' if depth == 0 => break,
+            b')' | b'}' => depth -= 1,
+            b':' if depth == 0 => count += 1,
+            _ => {}
+        }
+    }
+    count
+}
+
 struct Spice<'a> {
     names: &'a mut Names,
     spelling: expr::Dialect,
     reading: Reading,
+    calls: Option<&'a mut Calls>,
     file: FileId,
     offset: usize,
 }
@@ -112,6 +188,9 @@ impl Language for Spice<'_> {
                 let text = pair.as_str();
                 if text.eq_ignore_ascii_case("time") {
                     Node::Leaf(Leaf::Time)
+                } else if text.contains(COLON) {
+                    let text = text.replace(COLON, ":");
+                    Node::Leaf(Leaf::Parameter(self.names.intern(&text)))
                 } else {
                     Node::Leaf(Leaf::Parameter(self.names.intern(text)))
                 }
@@ -120,7 +199,7 @@ impl Language for Spice<'_> {
                 let inner = pair.into_inner().next()?;
                 let rule = inner.as_rule();
                 let mut parts = inner.into_inner();
-                if rule == Rule::braced {
+                if rule == Rule::braced || rule == Rule::quoted {
                     return parse::expression(self, parts.next()?, d);
                 }
                 let first = parts.next()?.as_str();
@@ -142,7 +221,7 @@ impl Language for Spice<'_> {
     fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = self.span(pair.as_span());
         let folded = name.to_ascii_lowercase();
-        if folded != "table" && folded != "pwl" {
+        if folded != "table" && folded != "pwl" && self.calls.is_none() {
             d.push(parse::unknown_function(name, span));
             return None;
         }
@@ -150,6 +229,10 @@ impl Language for Spice<'_> {
         for part in pair.into_inner().filter(|part| Self::role(part.as_rule()) == Role::Expression)
         {
             arguments.push(parse::expression(self, part, d)?);
+        }
+        if folded != "table" && folded != "pwl" {
+            let leaf = self.calls.as_mut()?.add(self.names, name, arguments, span);
+            return Some(Expr::new(Node::Leaf(leaf), span));
         }
         let mut arguments = arguments.into_iter();
         let x = arguments.next();

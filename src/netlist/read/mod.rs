@@ -5,7 +5,12 @@
 //! Expressions alone go through a grammar (grammar/spice.pest); plain numbers never do.
 
 pub mod guess;
+pub mod include;
 pub mod lines;
+pub mod pile;
+pub mod blocks;
+pub mod functions;
+pub mod options;
 pub mod number;
 pub mod cursor;
 pub mod expression;
@@ -15,11 +20,13 @@ pub mod cards;
 
 use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects::{Dialect, Reading};
-use crate::netlist::{Card, CardKind, Names, Netlist, Subcircuit};
+use crate::netlist::{Card, CardKind, Definition, Names, Netlist};
 use crate::source::{FileId, SourceMap, Span};
+use blocks::Blocks;
 use cursor::Cursor;
-use lines::Lines;
+use functions::Calls;
 use number::Number;
+use pile::Pile;
 pub use waveforms::WAVEFORMS;
 
 /// How a netlist is to be read.
@@ -29,12 +36,14 @@ pub struct How {
     pub dialect: Option<&'static Dialect>,
     /// The folder outside of which no file is read that a netlist names.
     pub confine: Option<String>,
+    /// Folders in which files are looked for, after that of the file that names them.
+    pub folders: Vec<String>,
 }
 
 impl How {
     /// In a dialect.
     pub fn of(dialect: &'static Dialect) -> How {
-        How { dialect: Some(dialect), confine: None }
+        How { dialect: Some(dialect), ..How::default() }
     }
 }
 
@@ -48,11 +57,29 @@ pub struct Reader<'d> {
     pub file: FileId,
     /// The names so far.
     pub names: Names,
+    /// Calls of functions that the netlist itself has to define.
+    pub calls: Calls,
+    /// Whether it defines any.
+    pub defined: bool,
+    /// Those that the card being read defines besides.
+    pub functions: Vec<Definition>,
+    /// Options that mean nothing here.
+    pub passed: Vec<String>,
     /// What is wrong.
     pub diagnostics: &'d mut Vec<Diagnostic>,
+    map: &'d SourceMap,
+    how: &'d How,
 }
 
-/// The netlist that a file holds. Lines that are wrong are left out, with errors.
+impl Reader<'_> {
+    /// The text of a data file that a card names. What is wrong has been said where there is none.
+    pub fn data(&mut self, name: &str, span: Span) -> Option<String> {
+        let found = include::data(self.map, self.file, name, self.how, span);
+        found.map_err(|error| self.diagnostics.push(*error)).ok()
+    }
+}
+
+/// The netlist that a file holds, and those that it names. Lines that are wrong are left out, with errors.
 pub fn read(
     map: &mut SourceMap,
     file: FileId,
@@ -60,34 +87,45 @@ pub fn read(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Netlist {
     let text = map.file(file).map_or("", |file| file.text.as_str());
-    let (title, body) = match text.find('\n') {
-        Some(end) => (&text[..end], end + 1),
-        None => (text, text.len()),
-    };
+    let title = text.lines().next().unwrap_or("").trim_start_matches('\u{feff}').to_string();
     let dialect = how.dialect.unwrap_or_else(|| {
         let guess = guess::guess(file, text);
         diagnostics.extend(guess.by.map(|span| guessed(guess.dialect, span)));
         guess.dialect
     });
-    let mut netlist = Netlist {
+    let includes = include::load(map, file, how, diagnostics);
+    let mut reading = dialect.reading();
+    if includes.replace_ground {
+        reading.grounds = EVERY_GROUND;
+    }
+    let mut reader = Reader {
         dialect,
-        title: title.trim_start_matches('\u{feff}').trim_end_matches('\r').to_string(),
-        ..Netlist::default()
+        reading,
+        file,
+        names: Names::default(),
+        calls: Calls::default(),
+        defined: false,
+        functions: vec![],
+        passed: vec![],
+        diagnostics,
+        map,
+        how,
     };
-    let reading = dialect.reading();
-    let mut reader = Reader { dialect, reading, file, names: Names::default(), diagnostics };
-    let mut scopes: Vec<(Subcircuit, Span, Option<String>)> = vec![];
+    let mut netlist = Netlist { dialect, title, ..Netlist::default() };
+    let mut pile = Pile::new(map, file, reading.comments);
+    let mut blocks = Blocks::default();
     let mut skipping: Option<Span> = None;
-    for line in Lines::new(text, body, reading.comments) {
+    while let Some((file, line)) = pile.next(reader.diagnostics) {
+        reader.file = file;
         let words: &str = &line.text;
         let span = Span::new(file, line.start, line.start + words.len());
-        let mut cursor = Cursor { text: words, base: line.start, at: 0 };
         if skipping.is_some() {
             if words.len() >= 5 && words.as_bytes()[..5].eq_ignore_ascii_case(b".endc") {
                 skipping = None;
             }
             continue;
         }
+        let mut cursor = Cursor { text: words, base: line.start, at: 0 };
         let kind = match words.as_bytes().first() {
             Some(b'*') => {
                 if header(&mut netlist, words) {
@@ -99,7 +137,10 @@ pub fn read(
                 cursor.at = 1;
                 let (keyword, _) = cursor.word();
                 match keyword.to_ascii_lowercase().as_str() {
-                    "end" => break,
+                    "end" => {
+                        pile.end();
+                        continue;
+                    }
                     "title" => {
                         netlist.title = cursor.rest().0.to_string();
                         None
@@ -118,35 +159,28 @@ pub fn read(
                         skipping = Some(span);
                         None
                     }
-                    "subckt" => {
-                        if let Some(subcircuit) = cards::subcircuit(&mut reader, &mut cursor) {
-                            scopes.push((subcircuit, span, line.comment));
-                        }
-                        continue;
+                    "include" | "inc" | "lib" | "endl" => {
+                        pile.include(&includes, keyword, cursor.rest().0, span, reader.diagnostics);
+                        None
                     }
-                    "ends" => match scopes.pop() {
-                        Some((subcircuit, opening, comment)) => {
-                            let kind = CardKind::Subcircuit(subcircuit);
-                            let card = Card { kind, span: opening, comment };
-                            push(&mut netlist, &mut scopes, card);
-                            None
+                    word => {
+                        let taken = blocks.take(&mut reader, &mut netlist, word, &mut cursor, span);
+                        if taken {
+                            blocks.comment(line.comment);
+                            continue;
                         }
-                        None => {
-                            reader.diagnostics.push(Diagnostic::error(
-                                "E0709",
-                                span,
-                                "`.ends` ends no subcircuit",
-                            ));
-                            None
-                        }
-                    },
-                    _ => cards::card(&mut reader, &mut cursor, span),
+                        cards::card(&mut reader, &mut cursor, span)
+                    }
                 }
             }
             _ => devices::device(&mut reader, &mut cursor).map(CardKind::Device),
         };
+        for definition in reader.functions.drain(..) {
+            let kind = CardKind::Function(definition);
+            blocks.push(&mut netlist, Card { kind, span, comment: None });
+        }
         if let Some(kind) = kind {
-            push(&mut netlist, &mut scopes, Card { kind, span, comment: line.comment });
+            blocks.push(&mut netlist, Card { kind, span, comment: line.comment });
         }
     }
     if let Some(span) = skipping {
@@ -156,33 +190,22 @@ pub fn read(
             "the commands after `.control` never end",
         ));
     }
-    while let Some((subcircuit, opening, comment)) = scopes.pop() {
-        let name = reader.names.text(subcircuit.name).to_string();
-        let error =
-            Diagnostic::error("E0709", opening, format!("the subcircuit `{name}` is never ended"));
-        reader.diagnostics.push(error);
-        push(
-            &mut netlist,
-            &mut scopes,
-            Card { kind: CardKind::Subcircuit(subcircuit), span: opening, comment },
-        );
-    }
+    blocks.close(&mut reader, &mut netlist);
+    functions::resolve(&mut reader, &mut netlist);
+    let passed = options::passed(&reader.passed);
+    reader.diagnostics.extend(passed);
     netlist.names = reader.names;
     netlist
 }
+
+/// Names of the ground where `.preprocess replaceground` asks for all of them.
+const EVERY_GROUND: &[&str] = &["0", "gnd", "gnd!", "ground"];
 
 /// Says how a text is read that does not say so itself.
 fn guessed(dialect: &Dialect, span: Span) -> Diagnostic {
     Diagnostic::note("N0719", span, format!("read as a netlist for {}", dialect.name))
         .says("only that simulator understands this")
         .help(format!("say it with --dialect {}, or that it is another", dialect.name))
-}
-
-fn push(netlist: &mut Netlist, scopes: &mut [(Subcircuit, Span, Option<String>)], card: Card) {
-    match scopes.last_mut() {
-        Some((subcircuit, _, _)) => subcircuit.cards.push(card),
-        None => netlist.cards.push(card),
-    }
 }
 
 /// `*bondspice key=value`, or `*bondspice+ …`, which goes on with the value before.

@@ -220,8 +220,12 @@ impl<F: Modular> Reading<'_, F> {
                 x.as_number().map(|x| Form::number(square_root(x))).ok_or(Trouble::Nonlinear)
             }
             (Function::PowerOfAbs, [x, y]) if even => self.power(x.clone(), y.clone(), second),
-            (Function::SignedPower, [x, y]) if odd => self.power(x.clone(), y.clone(), second),
-            (Function::PowerOfAbs | Function::SignedPower, _) => self.opaque(&function, arguments),
+            (Function::SignedPower | Function::RealPower, [x, y]) if odd => {
+                self.power(x.clone(), y.clone(), second)
+            }
+            (Function::PowerOfAbs | Function::SignedPower | Function::RealPower, _) => {
+                self.opaque(&function, arguments)
+            }
             _ => match function.row().netlist {
                 Spelling::Name(_) => self.opaque(&function, arguments),
                 Spelling::Expansion(template) => {

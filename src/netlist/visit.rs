@@ -1,0 +1,70 @@
+//! Every expression of a card, for what has to look at or change all of them.
+
+use super::{Card, CardKind, Device, Element, Expr, Source, Waveform};
+
+/// Calls `visit` for each expression of a card, but not of the cards within a subcircuit or a choice.
+pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
+    match &mut card.kind {
+        CardKind::Device(device) => device_mut(device, visit),
+        CardKind::Parameters(values) | CardKind::Initial(values) | CardKind::Guess(values) => {
+            values.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        CardKind::Subcircuit(subcircuit) => {
+            subcircuit.parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        CardKind::Choice(branches) => {
+            branches.iter_mut().filter_map(|branch| branch.condition.as_mut()).for_each(visit);
+        }
+        CardKind::Model { parameters, .. } => {
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        CardKind::Save { items, .. } => items.iter_mut().for_each(|(_, value)| visit(value)),
+        CardKind::Transient { step, stop, start, hmax, .. } => {
+            visit(step);
+            visit(stop);
+            start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
+        }
+        CardKind::Function(_)
+        | CardKind::Global(_)
+        | CardKind::Options(_)
+        | CardKind::OperatingPoint
+        | CardKind::Comment(_) => {}
+    }
+}
+
+fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
+    match &mut source.waveform {
+        Waveform::Constant(value) => visit(value),
+        Waveform::Function { arguments, .. } => arguments.iter_mut().for_each(&mut *visit),
+    }
+    source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
+}
+
+fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
+    match &mut device.element {
+        Element::Resistor { value } => visit(value),
+        Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {
+            visit(value);
+            initial.iter_mut().for_each(visit);
+        }
+        Element::Mutual { coupling, .. } => visit(coupling),
+        Element::VoltageSource(source) | Element::CurrentSource(source) => {
+            source_mut(source, visit);
+        }
+        Element::Vcvs { gain, .. }
+        | Element::Vccs { gain, .. }
+        | Element::Cccs { gain, .. }
+        | Element::Ccvs { gain, .. } => visit(gain),
+        Element::Line { impedance, delay, initial } => {
+            visit(impedance);
+            visit(delay);
+            initial.iter_mut().flatten().for_each(visit);
+        }
+        Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
+        Element::Switch { .. } | Element::CurrentSwitch { .. } => {}
+        Element::Diode { area, .. } => area.iter_mut().for_each(visit),
+        Element::Instance { parameters, .. } => {
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+    }
+}
