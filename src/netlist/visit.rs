@@ -43,9 +43,16 @@ fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
 fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut device.element {
         Element::Resistor { value } => visit(value),
-        Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {
+        Element::Capacitor { value, initial }
+        | Element::Inductor { value, initial }
+        | Element::Charge { law: value, initial }
+        | Element::Flux { law: value, initial } => {
             visit(value);
             initial.iter_mut().for_each(visit);
+        }
+        Element::Passive(passive) => {
+            passive.value.iter_mut().chain(&mut passive.initial).for_each(&mut *visit);
+            passive.parameters.iter_mut().for_each(|(_, value)| visit(value));
         }
         Element::Mutual { coupling, .. } => visit(coupling),
         Element::VoltageSource(source) | Element::CurrentSource(source) => {
@@ -62,7 +69,11 @@ fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
         }
         Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
         Element::Switch { .. } | Element::CurrentSwitch { .. } => {}
-        Element::Diode { area, .. } => area.iter_mut().for_each(visit),
+        Element::LawSwitch { control, .. } => visit(control),
+        Element::Diode { area, parameters, .. } => {
+            area.iter_mut().for_each(&mut *visit);
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
         Element::Instance { parameters, .. } => {
             parameters.iter_mut().for_each(|(_, value)| visit(value));
         }
