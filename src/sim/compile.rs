@@ -380,6 +380,8 @@ impl<'a> Builder<'a> {
                 .sources
                 .iter()
                 .map(|source| Source {
+                    device: source.device,
+                    parts: source.parts,
                     waveform: source.waveform.clone(),
                     into: source.into.iter().map(|(row, factor)| (row.0, *factor)).collect(),
                 })

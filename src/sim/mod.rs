@@ -1,11 +1,13 @@
 //! The simulator: Stamps → System → rows of a trace.
 //!
-//! [`compile`] once; then [`transient`] or [`operating_point`], as often as wanted. Nothing in here knows text: options
+//! [`compile`] once; then an analysis of the table [`ANALYSES`], as often as wanted. Nothing in here knows text: options
 //! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
 
+pub mod analyses;
 mod clocks;
 mod compile;
 mod conditions;
+mod dc;
 mod events;
 mod explain;
 mod laws;
@@ -24,10 +26,11 @@ mod system;
 mod tests;
 
 pub use crate::circuit::stamps::UnknownId;
+pub use analyses::{ANALYSES, Job};
 pub use compile::compile;
 pub use explain::{Failure, FailureKind};
 pub use methods::{METHODS, Method};
-pub use settings::{Interval, OPTIONS, OptionRow, Settings, Tolerance};
+pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Tolerance};
 pub use statistics::{Rejected, Statistics};
 pub use step::{OperatingPoint, operating_point, transient};
 pub use system::System;

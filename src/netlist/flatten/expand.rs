@@ -3,8 +3,10 @@
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::sources::Times;
 use super::values::near;
+use super::vary::Variation;
 use crate::circuit::{self, DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::read::number;
 use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
@@ -61,6 +63,16 @@ pub struct Pending<'n> {
 
 /// Expands a netlist.
 pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
+    static NONE: std::sync::LazyLock<Variation> = std::sync::LazyLock::new(Variation::default);
+    expand_with(netlist, &NONE, d)
+}
+
+/// Expands a netlist with other values in some places.
+pub fn expand_with<'n>(
+    netlist: &'n Netlist,
+    variation: &'n Variation,
+    d: &mut Vec<Diagnostic>,
+) -> Flat<'n> {
     let ground = Node { name: "0".into(), nominal: None, span: Span::NONE };
     let mut flat = Flat {
         netlist,
@@ -76,10 +88,20 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());
-    let mut expander =
-        Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
+    flat.scopes.temperature =
+        variation.temperature.or_else(|| stated_temperature(&netlist.cards)).unwrap_or(ROOM);
+    let ground = netlist.names.find("0");
+    let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
-    let (live, given) = expander.choose(TOP, &netlist.cards, &[], d);
+    let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], d);
+    for (name, expr) in &mut given {
+        *expr = variation.parameters.get(name).unwrap_or(expr);
+    }
+    for (name, model) in &mut expander.flat.scopes.get_mut(TOP).models {
+        if let Some(changed) = variation.models.get(name) {
+            model.2 = changed;
+        }
+    }
     expander.flat.scopes.get_mut(TOP).written =
         given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
@@ -95,8 +117,19 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
     flat
 }
 
+/// The circuit's temperature in °C, where an option states it. One that cannot be read is told of elsewhere.
+fn stated_temperature(cards: &[Card]) -> Option<f64> {
+    let options = cards.iter().filter_map(|card| match &card.kind {
+        CardKind::Options(options) => Some(options),
+        _ => None,
+    });
+    let texts = options.flatten().filter(|(key, _)| key == "temp");
+    texts.filter_map(|(_, text)| number::number(text)).last().map(|read| read.value)
+}
+
 struct Expander<'n> {
     flat: Flat<'n>,
+    variation: &'n Variation,
     ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
@@ -238,6 +271,9 @@ impl<'n> Expander<'n> {
                 | CardKind::Save { .. }
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
+                | CardKind::Analysis(_)
+                | CardKind::Step(_)
+                | CardKind::Data(_)
                     if id != TOP =>
                 {
                     let message = "this card belongs outside `.subckt`";
@@ -274,6 +310,14 @@ impl<'n> Expander<'n> {
         if self.full {
             return;
         }
+        let device = match self.variation.devices.is_empty() {
+            true => device,
+            false => {
+                let own = self.flat.netlist.names.text(device.name);
+                let path = format!("{}{own}", self.flat.scopes.get(id).path).to_lowercase();
+                self.variation.devices.get(&path).unwrap_or(device)
+            }
+        };
         let nodes: Vec<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;

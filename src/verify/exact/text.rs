@@ -81,8 +81,8 @@ impl<'n> Text<'n> {
                             Leaf::Voltage(there(*plus)?, minus.map(there).transpose()?)
                         }
                         Leaf::Current(name) => Leaf::Current(there(*name)?),
-                        Leaf::Time => Leaf::Time,
                         Leaf::Operator(..) => return Err("an operator".to_string()),
+                        other => other.clone(),
                     };
                     Ok(Expr::new(crate::expr::Node::Leaf(leaf), span))
                 });

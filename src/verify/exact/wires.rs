@@ -214,6 +214,9 @@ impl<'t, F: Modular> Wires<'t, F> {
             }
             Leaf::Time => Ok(Form::number(self.bonds.draw.of(Of::Time))),
             Leaf::Operator(..) => Err(Trouble::Nonlinear),
+            // They stand in outputs alone.
+            Leaf::Power(name) => Err(unknown(*name)),
+            Leaf::Part(_, inner) => self.leaf(scope, inner),
         }
     }
 
