@@ -478,10 +478,12 @@ impl<'a> Network<'a> {
         null_vector(rows, &self.system.frozen.pattern, &self.frozen.values)
     }
 
-    /// Whether a row of a charge takes part in what makes the frozen matrix singular.
-    pub fn is_singular_by_storages(&self, singular: &Singular) -> bool {
-        let n = self.system.equations() as u32;
-        singular.rows.iter().flatten().any(|row| *row >= n)
+    /// Whether a row of a charge that is not held takes part in what makes the frozen matrix singular.
+    pub fn is_singular_by_storages(&self, singular: &Singular, held: &[bool]) -> bool {
+        let n = self.system.equations();
+        let charges =
+            singular.rows.iter().flatten().filter_map(|row| (*row as usize).checked_sub(n));
+        charges.into_iter().any(|k| !held[k] && self.system.held[k])
     }
 
     /// Solves with the frozen network's factors, in place.

@@ -125,7 +125,7 @@ pub(crate) fn operating_point(
             let question = Question { held: &held, targets: &targets, floors, prime: true };
             match search::find(network, &question, state, scratch) {
                 Err(Cut::Singular(singular)) => {
-                    if !ties::hold_more(network, &singular, &mut held, &mut tied) {
+                    if !ties::hold_more(network, &singular, scratch, &mut held, &mut tied) {
                         return Err(Cut::Singular(singular));
                     }
                     network.forget_pivots();

@@ -11,6 +11,7 @@
 use super::network::Network;
 use super::newton::{Cut, Frozen, Scratch, frozen_misfit, solve_frozen};
 use super::op::State;
+use crate::linear::Singular;
 
 /// Conductances are taken away down to this one, S.
 const LEAST: f64 = 1e-21;
@@ -57,7 +58,7 @@ pub(crate) fn find(
         return Err(first);
     }
     if let Cut::Singular(singular) = &first {
-        if network.is_singular_by_storages(singular) {
+        if network.is_singular_by_storages(singular, question.held) {
             return Err(first);
         }
         // At rest, where a law may have no slope, the guess itself may be the solution.
@@ -97,6 +98,11 @@ pub(crate) fn find(
         // The helps did not come off the ground either: what stood in the way at first is the reason.
         Cut::NonFinite { .. } => Err(first),
         Cut::Singular(_) if !helped => Err(first),
+        Cut::Singular(ref singular)
+            if stays_singular(network, question, &best, singular, state.t) =>
+        {
+            Err(first)
+        }
         first => Err(Cut::NotFound(Box::new(Sought {
             gmin,
             drive,
@@ -106,6 +112,26 @@ pub(crate) fn find(
             singular: matches!(first, Cut::Singular(_)),
         }))),
     }
+}
+
+/// Whether the matrix is singular beside the best point too, not just where a law happens to have no slope.
+fn stays_singular(
+    network: &mut Network,
+    question: &Question,
+    best: &Best,
+    singular: &Singular,
+    t: f64,
+) -> bool {
+    let mut x = best.x.clone();
+    for column in singular.columns.iter().flatten().map(|column| *column as usize) {
+        if let (Some(x), Some(floor)) = (x.get_mut(column), question.floors.get(column)) {
+            *x += 1e3 * floor + 0.1 * x.abs();
+        }
+    }
+    network.linearise(&x, t, false);
+    let singular = network.factorise_frozen(question.held).is_err();
+    network.forget_pivots();
+    singular
 }
 
 fn solve(

@@ -6,7 +6,7 @@
 //! then held, at such a value that the sum comes out right; the others come to rest.
 
 use super::network::Network;
-use super::newton::Cut;
+use super::newton::{Cut, Scratch};
 use super::op::State;
 use crate::linear::Singular;
 
@@ -28,6 +28,7 @@ const MOST: usize = 64;
 pub(crate) fn hold_more(
     network: &Network,
     singular: &Singular,
+    scratch: &Scratch,
     held: &mut [bool],
     ties: &mut Vec<Tie>,
 ) -> bool {
@@ -64,8 +65,11 @@ pub(crate) fn hold_more(
         }
         let Some((charge, _)) = best else { continue };
         let factors = match &vector {
-            Some(_) => candidates().map(|k| (k, factor(k))).collect(),
-            None => vec![(charge, 1.0)],
+            Some(vector) if !is_driven(rows, vector, scratch) => {
+                candidates().map(|k| (k, factor(k))).collect()
+            }
+            // An integrator that a source moves keeps its own value, and will go on from there.
+            _ => vec![(charge, 1.0)],
         };
         let columns = singular.columns.iter().find(|columns| is_open(charge, columns));
         let open = columns.or(singular.columns.first()).cloned().unwrap_or_default();
@@ -73,6 +77,20 @@ pub(crate) fn hold_more(
         held[charge] = true;
     }
     ties.len() > before
+}
+
+/// Whether sources move the sum of charges, so that it keeps no value: y·b is not 0.
+fn is_driven(rows: &[u32], vector: &[f64], scratch: &Scratch) -> bool {
+    let (mut sum, mut size) = (0.0, 0.0);
+    for (row, y) in rows.iter().zip(vector) {
+        if let (Some(left), Some(terms)) =
+            (scratch.residual.get(*row as usize), scratch.sizes.get(*row as usize))
+        {
+            sum += y * left;
+            size += (y * terms).abs();
+        }
+    }
+    sum.abs() > 1e-9 * size
 }
 
 /// What each sum is off by.
