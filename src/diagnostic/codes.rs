@@ -218,6 +218,8 @@ pub const CODES: &[Code] = &[
     row("E0852", "the second route takes too many steps", "The run needs more steps than it is allowed; the laws or sources vary much faster than the run is long."),
     row("W0801", "unknown option", "No option of this name means anything here. It is ignored; the message lists those that are known."),
     row("W0803", "solution slides along a condition", "On either side of the condition the solution is led back to it at once: no side lasts, and it would change without end. The run goes on with a ramp in place of the jump, so narrow that the law takes the value between its two branches that keeps the solution there (a relay that chatters, dry friction at rest). The message says how wide. Give the law a slope of your own, or the condition some hysteresis, if the width matters."),
+    row("W0804", "operating point leaves a voltage open", "Only capacitors reach the node, so that no equation of rest says its voltage. The charge on it keeps its initial value, which is 0 where nothing is said. Join it to the rest by a resistor, or state the start by `ic=` and `uic`."),
+    row("W0805", "operating point leaves a current open", "Inductors, alone or with voltage sources, form a loop without resistance, so that no equation of rest says the current round it. The flux through the loop keeps its initial value, which is 0 where nothing is said. Put a resistance into the loop, or state the start by `ic=` and `uic`."),
     // -- 09: files and usage
     row("E0901", "no such file", "The file named does not exist. The message names the nearest one in the same folder."),
     row("E0902", "file cannot be read", "The system refused to read the file; its reason stands in the message."),

@@ -184,6 +184,8 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0850" "pole_passed_over.bg"
     "W0801" "unknown_option.bg"
     "W0803" "sliding.bg"
+    "W0804" "node_between_capacitors.cir"
+    "W0805" "inductor_across_a_source.cir"
     "E0901" "no_such_file.expected"
     "E0902" "unreadable.expected"
     "E0903" "folder.expected"

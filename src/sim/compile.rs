@@ -5,12 +5,13 @@ use super::explain;
 use super::laws::LawSet;
 use super::memory::MemoryData;
 use super::reduce;
+use super::structure;
 use super::system::{Guard, LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Dag, NodeId};
-use crate::linear::{Lu, Pattern};
+use crate::linear::Pattern;
 use crate::source::Span;
 use std::collections::BTreeMap;
 
@@ -34,7 +35,7 @@ pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
     builder.place_laws();
     builder.reduce();
     let system = builder.finish();
-    match check(&system) {
+    match structure::check(&system) {
         Ok(()) => Some(system),
         Err(singular) => {
             d.extend(explain::undetermined(&system, &singular));
@@ -213,12 +214,15 @@ impl<'a> Builder<'a> {
     fn reduce(&mut self) {
         let n = self.unknowns.len();
         let mut slopes: Vec<(u32, u32)> = vec![];
+        // Laws of time or of modes alone have no slope, and yet they move what stands in their equations.
+        let mut lawful = vec![];
         let mut curved_charges = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
                 let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
                 match &law.target {
                     Target::Equations(into) => {
+                        lawful.extend(into.iter().map(|(row, _)| *row));
                         for input in inputs {
                             slopes.extend(into.iter().map(|(row, _)| (*row, input)));
                         }
@@ -245,6 +249,9 @@ impl<'a> Builder<'a> {
             }
             for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
                 constant[row.0 as usize] = None;
+            }
+            for row in &lawful {
+                constant[*row as usize] = None;
             }
             let mut charges = self.charge_entries.clone();
             charges.extend(curved_charges.iter().map(|(k, input)| (*k, *input, 1.5)));
@@ -582,29 +589,4 @@ fn settled(pattern: &Pattern, slots: &[u32], fixed: &[(u32, f64)]) -> Vec<f64> {
         values[slots[*asked as usize] as usize] += value;
     }
     values
-}
-
-/// Whether W(α) can be solved with for some slopes of the laws. Slopes are drawn at random, so that a slope that
-/// happens to vanish somewhere is not taken for a fault of the circuit.
-fn check(system: &System) -> Result<(), crate::linear::Singular> {
-    const ALPHA: f64 = 1e6;
-    let plan = &system.dynamic;
-    let mut values = plan.fixed.clone();
-    for place in &plan.storage {
-        values[place.slot as usize] += ALPHA * place.factor;
-    }
-    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut draw = || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        0.5 + (seed >> 11) as f64 / (1u64 << 53) as f64
-    };
-    for group in &system.groups {
-        let slopes: Vec<f64> = (0..group.laws.partials()).map(|_| draw()).collect();
-        for place in group.dynamic.iter().chain(&group.dynamic_charge) {
-            values[place.slot as usize] += place.factor * slopes[place.partial as usize];
-        }
-    }
-    Lu::factor(&plan.pattern, &values).map(|_| ())
 }

@@ -18,12 +18,15 @@ mod newton;
 mod op;
 mod output;
 mod reduce;
+mod search;
 mod settings;
 mod statistics;
 mod step;
+mod structure;
 mod system;
 #[cfg(test)]
 mod tests;
+mod ties;
 
 pub use crate::circuit::stamps::UnknownId;
 pub use analyses::{ANALYSES, Job};

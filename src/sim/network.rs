@@ -5,6 +5,7 @@
 use super::events::Track;
 use super::laws::Registers;
 use super::memory::Memories;
+use super::reduce::null_vector;
 use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
 use crate::circuit::waveform::Segment;
@@ -84,6 +85,8 @@ pub(crate) struct Network<'a> {
     pub stop: f64,
     /// A conductance from every node to ground, while an operating point is sought; otherwise 0.
     pub gmin: f64,
+    /// The values that this conductance leads to, one for each unknown; mostly 0.
+    pub anchor: Vec<f64>,
     /// Factor of all sources, while an operating point is sought; otherwise 1.
     pub drive: f64,
     /// Pins the nodes of `.ic` to their values, while an operating point is sought.
@@ -120,6 +123,7 @@ impl<'a> Network<'a> {
             tracks: vec![Track::default(); system.modes.len()],
             stop,
             gmin: 0.0,
+            anchor: vec![0.0; system.equations()],
             drive: 1.0,
             pin_initial: false,
             statistics: Statistics::default(),
@@ -287,8 +291,8 @@ impl<'a> Network<'a> {
             }
         }
         if self.gmin != 0.0 {
-            for (r, x) in r.iter_mut().zip(x).take(self.system.nodes) {
-                *r += self.gmin * x;
+            for ((r, x), anchor) in r.iter_mut().zip(x).zip(&self.anchor).take(self.system.nodes) {
+                *r += self.gmin * (x - anchor);
             }
         }
         if self.pin_initial {
@@ -337,8 +341,9 @@ impl<'a> Network<'a> {
             }
         }
         if self.gmin != 0.0 {
-            for (sum, x) in s.iter_mut().zip(x).take(self.system.nodes) {
-                *sum += (self.gmin * x).abs();
+            let all = s.iter_mut().zip(x).zip(&self.anchor);
+            for ((sum, x), anchor) in all.take(self.system.nodes) {
+                *sum += self.gmin * (x.abs() + anchor.abs());
             }
         }
         if self.pin_initial {
@@ -466,6 +471,19 @@ impl<'a> Network<'a> {
             }
         }
         self.frozen.factorise(plan, &mut self.statistics)
+    }
+
+    /// The one combination of these rows of the frozen matrix that vanishes.
+    pub fn frozen_null_vector(&self, rows: &[u32]) -> Option<Vec<f64>> {
+        null_vector(rows, &self.system.frozen.pattern, &self.frozen.values)
+    }
+
+    /// Whether a row of a charge that is not held takes part in what makes the frozen matrix singular.
+    pub fn is_singular_by_storages(&self, singular: &Singular, held: &[bool]) -> bool {
+        let n = self.system.equations();
+        let charges =
+            singular.rows.iter().flatten().filter_map(|row| (*row as usize).checked_sub(n));
+        charges.into_iter().any(|k| !held[k] && self.system.held[k])
     }
 
     /// Solves with the frozen network's factors, in place.

@@ -1,6 +1,7 @@
 //! Newton's method on a step's equations and on the frozen network, with tests of both update and residual.
 
 use super::network::Network;
+use super::search::Sought;
 use crate::circuit::DeviceId;
 use crate::linear::{Cause, Singular};
 
@@ -13,15 +14,19 @@ pub(crate) enum Cut {
     Singular(Singular),
     /// A value is infinite or no number; the device whose law it is, where one is to blame.
     NonFinite { device: Option<DeviceId> },
+    /// No values satisfy the frozen network, as far as was sought.
+    NotFound(Box<Sought>),
 }
 
 /// Buffers of Newton's method.
 #[derive(Debug)]
 pub(crate) struct Scratch {
-    residual: Vec<f64>,
+    pub residual: Vec<f64>,
     rates: Vec<f64>,
-    sizes: Vec<f64>,
+    pub sizes: Vec<f64>,
     update: Vec<f64>,
+    /// The update before.
+    before: Vec<f64>,
 }
 
 impl Scratch {
@@ -31,8 +36,23 @@ impl Scratch {
             rates: vec![0.0; charges],
             sizes: vec![0.0; n + charges],
             update: vec![0.0; n + charges],
+            before: vec![0.0; n + charges],
         }
     }
+}
+
+/// Part of an update that swings back over the last one.
+const SWING: f64 = 0.38;
+
+/// Whether an update leads back over most of the one before, so that the next one would do the same: Newton's method
+/// goes to and fro between the two sides of a root (of √|x|, say) and never meets it.
+fn swings(update: &[f64], before: &[f64], weights: &[f64]) -> bool {
+    let (mut across, mut along) = (0.0, 0.0);
+    for ((u, b), weight) in update.iter().zip(before).zip(weights) {
+        across += (u / weight) * (b / weight);
+        along += (b / weight) * (b / weight);
+    }
+    across < -0.5 * along
 }
 
 /// A residual as large as this part of the terms it is made of is none.
@@ -66,33 +86,43 @@ pub(crate) fn solve_stage(
     let n = x.len();
     let linear = network.system.is_linear();
     let mut before = f64::INFINITY;
+    let mut damping = false;
     for iteration in 0..MOST {
         network.statistics.iterations += 1;
         let limited = network.linearise(x, stage.t, true);
         network.charges(x, q);
         let residual = &mut scratch.residual[..n];
         stage_residual(network, stage, x, q, residual, &mut scratch.rates);
+        if iteration == 0 && !linear && residual.iter().all(|r| *r == 0.0) {
+            // At rest, where the matrix may be singular, the guess is the solution.
+            return Ok(());
+        }
         network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
         network.solve_dynamic(residual);
+        let last = &mut scratch.before[..n];
+        let damped = damping && swings(residual, last, stage.weights);
+        let part = if damped { SWING } else { 1.0 };
         let mut update: f64 = 0.0;
         for ((x, dx), weight) in x.iter_mut().zip(residual.iter()).zip(stage.weights) {
             if !dx.is_finite() {
                 return Err(Cut::NonFinite { device: network.non_finite_law() });
             }
-            *x -= dx;
+            *x -= part * dx;
             update = update.max(dx.abs() / weight);
         }
+        last.copy_from_slice(residual);
         if linear {
             network.charges(x, q);
             return Ok(());
         }
         let rate = if iteration == 0 { 0.0 } else { update / before };
+        damping = rate >= 0.5;
         let done = match iteration {
             0 => update <= 0.1 * stage.tolerance,
             _ => rate < 1.0 && update * rate / (1.0 - rate) <= stage.tolerance,
         };
         before = update;
-        if limited || !done {
+        if limited || !done || damped {
             if !limited && iteration >= 4 && rate > 2.0 {
                 break;
             }
@@ -215,6 +245,7 @@ pub(crate) fn solve_frozen(
     }
     let linear = network.system.is_linear();
     let mut before = f64::INFINITY;
+    let mut damping = false;
     let mut step = 1.0;
     for iteration in 0..frozen.most {
         network.statistics.iterations += 1;
@@ -234,9 +265,20 @@ pub(crate) fn solve_frozen(
         }
         step = 1.0;
         let (ratio, _) = relative_frozen(network, frozen, x, w, scratch);
-        network.factorise_frozen(frozen.held).map_err(|singular| explain(network, singular))?;
+        if let Err(singular) = network.factorise_frozen(frozen.held) {
+            let cut = explain(network, singular);
+            // Where a slope is infinite (a root at 0) and the equations hold, there is nothing to be bettered.
+            if matches!(cut, Cut::NonFinite { .. }) && ratio <= 1e-9 {
+                return Ok(());
+            }
+            return Err(cut);
+        }
         scratch.update.copy_from_slice(&scratch.residual);
         network.solve_frozen(&mut scratch.update);
+        let damped = damping && swings(&scratch.update[..n], &scratch.before[..n], frozen.floors);
+        if damped {
+            scratch.update.iter_mut().for_each(|dx| *dx *= SWING);
+        }
         let mut update: f64 = 0.0;
         for ((x, dx), floor) in x.iter_mut().zip(&scratch.update[..n]).zip(frozen.floors) {
             if !dx.is_finite() {
@@ -248,11 +290,13 @@ pub(crate) fn solve_frozen(
         for (w, dw) in w.iter_mut().zip(&scratch.update[n..]) {
             *w -= dw;
         }
+        scratch.before.copy_from_slice(&scratch.update);
+        damping = update >= 0.5 * before;
         // Settled: the residual was rounding already, and the update is small or has ceased to shrink.
         let settled = update <= 1e-14
             || (ratio <= 1e-9 && (update <= 1e-9 || (iteration >= 2 && update >= 0.5 * before)));
         before = update;
-        if linear || (settled && !limited) {
+        if linear || (settled && !limited && !damped) {
             network.evaluate(x, frozen.t);
             network.charges(x, q);
             frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
@@ -297,6 +341,37 @@ pub(crate) fn correct_frozen(
         *w -= dw;
     }
     update
+}
+
+/// What the frozen network's equations leave over at a point: (row, what is left, sum of the terms' sizes), worst first.
+pub(crate) fn frozen_misfit(
+    network: &mut Network,
+    frozen: &Frozen,
+    x: &[f64],
+    w: &[f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> Vec<(usize, f64, f64)> {
+    network.evaluate(x, frozen.t);
+    network.charges(x, q);
+    frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+    relative_frozen(network, frozen, x, w, scratch);
+    worst_rows(&scratch.residual[..x.len()], &scratch.sizes[..x.len()])
+}
+
+/// Rows by how badly they are satisfied, worst first; those that are satisfied left out.
+pub(crate) fn worst_rows(residual: &[f64], sizes: &[f64]) -> Vec<(usize, f64, f64)> {
+    let ratio = |left: f64, size: f64| {
+        let ratio = if left == 0.0 { 0.0 } else { left.abs() / size.max(f64::MIN_POSITIVE) };
+        if ratio.is_nan() { f64::INFINITY } else { ratio }
+    };
+    let all = residual.iter().zip(sizes).enumerate();
+    let mut rows: Vec<(usize, f64, f64)> = all
+        .filter(|(_, (left, size))| ratio(**left, **size) > RESIDUAL)
+        .map(|(row, (left, size))| (row, *left, *size))
+        .collect();
+    rows.sort_by(|a, b| ratio(b.1, b.2).total_cmp(&ratio(a.1, a.2)));
+    rows
 }
 
 fn frozen_residual(

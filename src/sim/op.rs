@@ -5,8 +5,12 @@
 //! nothing feeds back to), those storages keep their initial values.
 
 use super::events::{Slide, settle_modes};
+use super::explain;
 use super::network::Network;
-use super::newton::{Cut, Frozen, Scratch, solve_frozen};
+use super::newton::{Cut, Scratch};
+use super::search::{self, Question};
+use super::step::Stuck;
+use super::ties;
 use crate::circuit::DeviceId;
 
 /// Values at an instant.
@@ -42,6 +46,8 @@ pub(crate) enum Trouble {
     Cut(Cut),
     /// Modes that keep each other from settling.
     Modes(DeviceId),
+    /// A step that became too small.
+    Stuck(Box<Stuck>),
 }
 
 impl From<Cut> for Trouble {
@@ -88,8 +94,9 @@ pub(crate) fn consistent_values(
 ) -> Result<(), Trouble> {
     let held = &network.system.held;
     let targets = state.q.clone();
+    let question = Question { held, targets: &targets, floors, prime: false };
     let result = settle_modes(network, state, slides, |network, state| {
-        find(network, held, &targets, floors, state, false, scratch)
+        search::find(network, &question, state, scratch)
     });
     if result.is_err() {
         // What the search left behind is no charge that anybody stated.
@@ -109,128 +116,50 @@ pub(crate) fn operating_point(
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
     network.pin_initial = true;
+    let mut held = vec![false; network.system.charges()];
+    let mut tied = vec![];
     let result = settle_modes(network, state, slides, |network, state| {
-        let mut held = vec![false; network.system.charges()];
+        held.fill(false);
+        tied.clear();
         loop {
-            match find(network, &held, &targets, floors, state, true, scratch) {
+            let question = Question { held: &held, targets: &targets, floors, prime: true };
+            match search::find(network, &question, state, scratch) {
                 Err(Cut::Singular(singular)) => {
-                    let n = network.system.equations() as u32;
-                    let before = held.iter().filter(|h| **h).count();
-                    // A storage whose value is open (its unknowns are in a null vector) and whose rate would satisfy
-                    // the equations that contradict each other (its row is in a null vector of the transpose).
-                    for row in singular.rows.iter().flatten().filter(|row| **row >= n) {
-                        let k = (row - n) as usize;
-                        if !network.system.held[k] {
-                            continue;
-                        }
-                        let open = |unknown: usize| {
-                            singular.columns.iter().any(|set| set.contains(&(unknown as u32)))
-                        };
-                        held[k] |= network.system.charges.row(k).any(|(unknown, _)| open(unknown));
-                        held[k] |= network.system.curved[k];
-                    }
-                    if held.iter().filter(|h| **h).count() == before {
+                    if !ties::hold_more(network, &singular, scratch, &mut held, &mut tied) {
                         return Err(Cut::Singular(singular));
                     }
                     network.forget_pivots();
                 }
-                other => return other,
+                Err(other) => return Err(other),
+                Ok(()) => break,
             }
         }
+        ties::settle(network, &tied, &targets, state, |network, targets, state| {
+            let question = Question { held: &held, targets, floors, prime: false };
+            search::find(network, &question, state, scratch)
+        });
+        Ok(())
     });
+    if result.is_ok() {
+        say_ties(network, &tied);
+    }
     network.pin_initial = false;
     network.forget_pivots();
     result
 }
 
-/// Newton from the guess, then with a conductance at every node that is taken away step by step, then with sources
-/// that are turned up step by step.
-fn find(
-    network: &mut Network,
-    held: &[bool],
-    targets: &[f64],
-    floors: &[f64],
-    state: &mut State,
-    prime: bool,
-    scratch: &mut Scratch,
-) -> Result<(), Cut> {
-    let mut frozen = Frozen { t: state.t, held, targets, floors, most: 100, prime };
-    let State { x, w, q, .. } = state;
-    let guess = (x.clone(), w.clone());
-    let first = match solve_frozen(network, &frozen, x, w, q, scratch) {
-        Ok(()) => return Ok(()),
-        Err(cut) => cut,
-    };
-    if network.system.is_linear() {
-        return Err(first);
+/// Warns of what the operating point left open. Bond graphs begin with what their storages are said to hold.
+fn say_ties(network: &mut Network, tied: &[ties::Tie]) {
+    const MOST: usize = 6;
+    let system = network.system;
+    if !system.spoken.is_empty() {
+        return;
     }
-    if matches!(first, Cut::Singular(_)) {
-        // A law may have no slope just where the guess is (f·|f| at rest): look from beside it.
-        for scale in [1.0, -1.0, 1e3, -1e3, 1e6, -1e6] {
-            for (x, floor) in x.iter_mut().zip(floors) {
-                *x = scale * floor;
-            }
-            w.fill(0.0);
-            network.forget_pivots();
-            if solve_frozen(network, &frozen, x, w, q, scratch).is_ok() {
-                return Ok(());
-            }
-        }
-        network.forget_pivots();
-    }
-    // gmin stepping
-    x.fill(0.0);
-    w.fill(0.0);
-    frozen.most = 60;
-    let mut found = true;
-    let (mut gmin, mut factor) = (1.0, 10.0);
-    let mut kept = (x.clone(), w.clone());
-    while gmin > 1e-21 {
-        network.gmin = gmin;
-        if solve_frozen(network, &frozen, x, w, q, scratch).is_ok() {
-            kept = (x.clone(), w.clone());
-            frozen.prime = false;
-            gmin /= factor;
-        } else {
-            x.copy_from_slice(&kept.0);
-            w.copy_from_slice(&kept.1);
-            if factor < 1.2 || gmin >= 1.0 {
-                found = false;
-                break;
-            }
-            gmin *= factor;
-            factor = factor.sqrt();
-            gmin /= factor;
+    for tie in tied.iter().take(MOST) {
+        let warning = explain::left_open(system, tie.charge, &tie.open);
+        let said = &mut network.statistics.warnings;
+        if !said.iter().any(|other| other.message == warning.message) {
+            said.push(warning);
         }
     }
-    network.gmin = 0.0;
-    if found && solve_frozen(network, &frozen, x, w, q, scratch).is_ok() {
-        return Ok(());
-    }
-    // source stepping
-    x.fill(0.0);
-    w.fill(0.0);
-    frozen.prime = false;
-    let (mut reached, mut step) = (0.0_f64, 0.125_f64);
-    kept = (x.clone(), w.clone());
-    while reached < 1.0 && step > 1e-4 {
-        let next: f64 = (reached + step).min(1.0);
-        network.drive = next;
-        if solve_frozen(network, &frozen, x, w, q, scratch).is_ok() {
-            kept = (x.clone(), w.clone());
-            reached = next;
-            step *= 2.0;
-        } else {
-            x.copy_from_slice(&kept.0);
-            w.copy_from_slice(&kept.1);
-            step *= 0.25;
-        }
-    }
-    network.drive = 1.0;
-    if reached >= 1.0 {
-        return Ok(());
-    }
-    x.copy_from_slice(&guess.0);
-    w.copy_from_slice(&guess.1);
-    Err(first)
 }

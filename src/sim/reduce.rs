@@ -112,7 +112,7 @@ fn usable(parts: &Parts, set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Opti
 }
 
 /// The one combination of these rows that vanishes, by elimination with full pivoting.
-fn null_vector(set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Option<Vec<f64>> {
+pub(crate) fn null_vector(set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Option<Vec<f64>> {
     let mut columns: Vec<Vec<f64>> = vec![];
     for j in 0..pattern.n {
         let mut column = vec![0.0; set.len()];

@@ -37,6 +37,8 @@ pub struct Statistics {
     pub events: u64,
     /// Conditions that became ramps because no side of them lasted.
     pub slides: u64,
+    /// Times that TR-BDF2 led round a place where the run's own method found no way.
+    pub detours: u64,
     /// Corners of sources landed on.
     pub corners: u64,
     /// Rows written.
@@ -148,6 +150,9 @@ impl fmt::Display for Statistics {
         writeln!(f, "corners, events  {}, {}", self.corners, self.events)?;
         if self.slides > 0 {
             writeln!(f, "sliding          {} conditions", self.slides)?;
+        }
+        if self.detours > 0 {
+            writeln!(f, "detours          {} by TR-BDF2", self.detours)?;
         }
         write!(f, "rows             {}", self.rows)
     }

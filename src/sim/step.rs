@@ -4,14 +4,17 @@ mod crossing;
 pub(super) mod past;
 mod restart;
 mod rows;
+mod trouble;
 
 use self::crossing::{Crossed, Located, Search};
+use self::trouble::Cuts;
+pub(crate) use self::trouble::{Reason, Stuck};
 use super::events::Controls;
 use super::explain::{Failure, FailureKind, Moment, failure};
 use super::methods::{self, Method, Work};
 use super::network::Network;
 use super::newton::Cut;
-use super::op::{self, State, Trouble};
+use super::op::{self, State};
 use super::output::{Inside, Rows};
 use super::settings::{Settings, Tolerance};
 use super::statistics::Statistics;
@@ -130,7 +133,11 @@ struct Run<'a> {
     weights: Vec<f64>,
     /// Unknowns of index 2.
     untested: Vec<bool>,
+    /// Rates of index 2, and the largest of each so far.
+    untested_rates: Vec<bool>,
+    largest_rates: Vec<f64>,
     index2: bool,
+    was_index2: bool,
     floors: Vec<f64>,
     state: State,
     next: State,
@@ -150,6 +157,9 @@ struct Run<'a> {
     /// Whether no step has been accepted since the last restart, and whether its fast layer has been passed over.
     fresh: bool,
     smoothed: bool,
+    /// The method to come back to, and after how many steps; 0 where there is nothing to come back from.
+    home: Method,
+    detour: u32,
     /// Events since a moment, to see when they pile up.
     crowd: (f64, u32),
 }
@@ -193,7 +203,10 @@ impl<'a> Run<'a> {
             largest: vec![0.0; n],
             weights: vec![0.0; n],
             untested: vec![false; n],
+            untested_rates: vec![false; charges],
+            largest_rates: vec![0.0; charges],
             index2: false,
+            was_index2: false,
             floors: op::floors(&network),
             state: State::new(0.0, n, charges),
             next: State::new(0.0, n, charges),
@@ -208,6 +221,8 @@ impl<'a> Run<'a> {
             last: None,
             fresh: true,
             smoothed: false,
+            home: settings.method,
+            detour: 0,
             crowd: (0.0, 0),
             network,
             settings,
@@ -241,7 +256,7 @@ impl<'a> Run<'a> {
     /// One accepted step. Says whether it ended on a corner, and on which mode's threshold.
     fn advance(&mut self) -> Result<(bool, Option<usize>), Failure> {
         let corner = self.network.next_corner().min(self.settings.stop);
-        let remaining = corner - self.state.t;
+        let mut remaining = corner - self.state.t;
         let mut power = self.method.error_power();
         let limit = self.settings.hmax.unwrap_or(f64::INFINITY).min(self.sight);
         let limit = limit.min(self.network.memories.longest_step());
@@ -249,7 +264,8 @@ impl<'a> Run<'a> {
         let mut h = planned;
         let mut bounded = false;
         let mut search = Search::default();
-        let (mut failed, mut let_go) = (false, false);
+        let (mut failed, mut let_go, mut detoured) = (false, false, false);
+        let mut cuts = Cuts::default();
         loop {
             // Land on the corner; two equal steps where one would leave a sliver.
             let lands = !bounded && h >= remaining * (1.0 - 1e-6);
@@ -294,6 +310,7 @@ impl<'a> Run<'a> {
                 }
                 Ok(error) => {
                     self.network.statistics.rejected.error += 1;
+                    cuts.note(h, Reason::Error(self.worst_error(), error));
                     h *= (0.9 * libm::pow(error, -1.0 / power)).clamp(0.1, 0.9);
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
@@ -308,11 +325,18 @@ impl<'a> Run<'a> {
                 }
                 Err(cut) => {
                     let rejected = &mut self.network.statistics.rejected;
-                    match &cut {
-                        Cut::NoConvergence { .. } => rejected.newton += 1,
-                        Cut::Singular(_) => rejected.singular += 1,
-                        Cut::NonFinite { .. } => rejected.non_finite += 1,
+                    let reason = match &cut {
+                        Cut::Singular(_) => Reason::Singular,
+                        Cut::NonFinite { .. } => Reason::NonFinite,
+                        Cut::NoConvergence { worst } => Reason::Newton(*worst),
+                        Cut::NotFound(_) => Reason::Newton(0),
+                    };
+                    match reason {
+                        Reason::Singular => rejected.singular += 1,
+                        Reason::NonFinite => rejected.non_finite += 1,
+                        _ => rejected.newton += 1,
                     }
+                    cuts.note(h, reason);
                     // A branch may have no values past its threshold.
                     if !let_go && self.watches && self.network.free_all() {
                         let_go = true;
@@ -327,26 +351,30 @@ impl<'a> Run<'a> {
             failed = true;
             bounded = false;
             search = Search::default();
+            let hopeless = h < (LAYER * remaining).max(self.smallest);
+            let singular = matches!(cut, Cut::Singular(_));
+            if (hopeless || singular) && !detoured && self.take_detour() {
+                detoured = true;
+                power = self.method.error_power();
+                h = planned;
+                continue;
+            }
             if self.fresh && !self.smoothed && h < LAYER * remaining {
                 // A layer this thin (a junction's capacitance behind its series resistance) is beyond resolving.
                 self.smoothed = true;
-                self.redistribute(Moment::Restart)?;
+                if let Err(failure) = self.redistribute(Moment::Restart) {
+                    if !self.step_over(LAYER * remaining) {
+                        return Err(failure);
+                    }
+                    remaining = corner - self.state.t;
+                }
                 self.weigh();
                 self.work.linearised = false;
                 h = 1e-6 * remaining;
                 continue;
             }
             if h < self.smallest {
-                let network = &self.network;
-                let trouble = Trouble::Cut(cut);
-                let statistics = &network.statistics;
-                return Err(failure(
-                    network.system,
-                    Moment::Step,
-                    self.state.t,
-                    &trouble,
-                    statistics,
-                ));
+                return Err(self.stuck(cut, cuts));
             }
         }
     }
@@ -380,6 +408,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), Failure> {
         self.network.statistics.accepted += 1;
         self.fresh = false;
+        self.end_detour();
         let most = match self.method {
             Method::Gear2 => 2.0,
             _ => 6.0,

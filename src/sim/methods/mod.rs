@@ -151,6 +151,8 @@ pub(crate) struct Work {
     pub slopes: Vec<f64>,
     /// The local error of each unknown.
     pub error: Vec<f64>,
+    /// Weights of the rates that no unknown's error shows, since the circuit is of index 2 there; infinite elsewhere.
+    pub rate_weights: Vec<f64>,
     pub dense: Dense,
     pub scratch: Scratch,
     /// The time before the last, for methods of several steps; `None` after a restart.
@@ -174,6 +176,7 @@ impl Work {
             right: vec![0.0; n],
             slopes: vec![0.0; n],
             error: vec![0.0; n],
+            rate_weights: vec![f64::INFINITY; charges],
             dense: Dense::new(n, charges),
             scratch: Scratch::new(n, charges),
             before: None,

@@ -65,6 +65,7 @@ impl Run<'_> {
             asked => (asked, "asked for"),
         };
         self.method = method;
+        self.home = method;
         count_system(&mut self.network, method.name(), reason);
         let span = self.distance();
         self.h = self.settings.h0.unwrap_or(1e-3 * span).min(span);
@@ -88,13 +89,16 @@ impl Run<'_> {
                 if self.index2 {
                     self.index2 = false;
                     self.untested.fill(false);
+                    self.untested_rates.fill(false);
                 }
             }
             Err(Trouble::Cut(Cut::Singular(singular))) => {
                 self.index2 = true;
                 self.untested.fill(false);
+                self.untested_rates.fill(false);
                 self.leave_untested(&singular);
                 self.look_about();
+                self.detour = 0;
                 if matches!(self.method, Method::Rodas4 | Method::Rodas5p) {
                     self.method = Method::TrBdf2;
                     self.network.statistics.method = Method::TrBdf2.name().into();
@@ -128,9 +132,11 @@ impl Run<'_> {
 
     /// What a null vector moves is of index 2.
     fn leave_untested(&mut self, singular: &Singular) {
-        for column in singular.columns.iter().flatten() {
-            if let Some(untested) = self.untested.get_mut(*column as usize) {
-                *untested = true;
+        let n = self.untested.len();
+        for column in singular.columns.iter().flatten().map(|column| *column as usize) {
+            match column.checked_sub(n) {
+                None => self.untested[column] = true,
+                Some(k) => self.untested_rates[k] = true,
             }
         }
     }
@@ -195,6 +201,7 @@ impl Run<'_> {
         match outcome {
             Ok(()) => Ok(()),
             Err(cut) => {
+                self.state.copy_from(&start);
                 let network = &self.network;
                 let trouble = Trouble::Cut(cut);
                 Err(failure(network.system, moment, start.t, &trouble, &network.statistics))
@@ -257,6 +264,18 @@ impl Run<'_> {
                 f64::INFINITY
             } else {
                 (part * (reltol * self.largest[k] + self.absolute[k])).max(f64::MIN_POSITIVE)
+            };
+        }
+        if !self.index2 && !self.was_index2 {
+            return;
+        }
+        self.was_index2 = self.index2;
+        for (k, w) in self.state.w.iter().enumerate() {
+            self.largest_rates[k] = self.largest_rates[k].max(w.abs());
+            self.work.rate_weights[k] = if self.untested_rates[k] {
+                reltol * self.largest_rates[k] + self.settings.abstol
+            } else {
+                f64::INFINITY
             };
         }
     }
