@@ -1,6 +1,7 @@
 //! Netlists: cards as data. Reading, writing, flattening and the map are verbs on them.
 
 pub mod names;
+pub mod references;
 pub mod header;
 pub mod read;
 pub mod write;
