@@ -4,6 +4,7 @@ pub mod names;
 pub mod visit;
 pub mod parts;
 pub mod analysis;
+pub mod references;
 pub mod header;
 pub mod read;
 pub mod write;

@@ -1,7 +1,7 @@
 //! What is to be computed: parameters, options, saved variables, the transient, and the header that other simulators
 //! skip.
 
-use super::Builder;
+use super::{Builder, Mark};
 use super::values::Speaker;
 use crate::bond::graph::{Expr as GraphExpr, Leaf, ParameterId};
 use crate::diagnostic::Diagnostic;
@@ -75,6 +75,7 @@ impl Builder<'_> {
 
     /// Adds options, saved variables and the transient, and returns the header.
     pub(super) fn experiment_cards(&mut self, diagnostics: &mut Vec<Diagnostic>) -> Header {
+        self.mark(Mark::default());
         let experiment = &self.graph.experiment;
         let mut columns = Vec::new();
         let mut saved = Vec::new();
@@ -235,7 +236,7 @@ impl Builder<'_> {
 }
 
 /// Whether ngspice computes an expression in a `.param` as we do: sums, products, fractions and the plainest functions.
-fn portable(expr: &GraphExpr) -> bool {
+pub(super) fn portable(expr: &GraphExpr) -> bool {
     match &*expr.node {
         Node::Number(value) => value.is_finite(),
         Node::Leaf(_) => true,
