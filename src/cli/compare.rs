@@ -18,9 +18,9 @@ reference b, the trace a interpolated there.\n\nExample: bondspice compare run.c
 /// Its flags.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The trace: CSV, RAW or JSON; - for standard input
+    /// The trace: CSV, RAW (ngspice, Xyce, LTspice), JSON, VCD or a table of blanks; - for standard input
     trace: String,
-    /// The reference: CSV, RAW or JSON; - for standard input
+    /// The reference, in any of these; - for standard input
     reference: String,
     /// Largest error allowed, as a part of the reference's range
     #[arg(long, default_value_t = 1e-3, value_name = "X", allow_hyphen_values = true)]

@@ -196,6 +196,11 @@ impl Output {
     ) -> Result<Output, Exit> {
         let chosen = format_for(format, to, session)?;
         let to = to.filter(|name| *name != "-");
+        if let Some(why) = (chosen.refuses)(names) {
+            let message = format!("the result cannot be written as `{}`: {why}", chosen.name);
+            let error = Diagnostic::error("E0935", Span::NONE, message);
+            return Err(session.fail(error.help("CSV, RAW and JSON hold every result")));
+        }
         let rows = || Trace::new(names.to_vec(), units.to_vec());
         let kind = match (chosen.name, to) {
             (_, None) if format.is_none() && io::stdout().is_terminal() => Kind::Table(rows()),

@@ -30,10 +30,10 @@ pub struct Arguments {
     file: String,
     #[command(flatten)]
     model: ModelFlags,
-    /// Where to write the result: .csv, .raw or .json
+    /// Where to write the result: .csv, .raw, .json, .vcd or .prn
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
-    /// Format of the result (csv, raw, json); else from the ending of -o
+    /// Format of the result (csv, raw, rawascii, ltspice, vcd, json, prn); else from the ending of -o
     #[arg(long, value_name = "FORMAT")]
     format: Option<String>,
     /// Head columns as `name [unit]`

@@ -8,7 +8,7 @@ use crate::netlist::read::How;
 use crate::netlist::{self, CardKind, Element, Leaf, Netlist};
 use crate::source::{SourceMap, Span};
 use crate::trace::formats::Heading;
-use crate::trace::{Sink, Trace};
+use crate::trace::{Trace, send};
 use serde::Deserialize;
 use std::collections::HashSet;
 
@@ -22,7 +22,7 @@ ngspice -b -r model.raw model.cir\n         bondspice trace model.raw --map map.
 /// Its flags.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The result: RAW, CSV or JSON; - for standard input
+    /// The result: RAW (ngspice, Xyce, LTspice), CSV, JSON, VCD or a table of blanks; - for standard input
     trace: String,
     /// The map that `bondspice convert --map` wrote; without it names stay
     #[arg(long, value_name = "FILE")]
@@ -30,7 +30,7 @@ pub struct Arguments {
     /// Where to write the result
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
-    /// Format of the result (csv, raw, json); else from the ending of -o
+    /// Format of the result (csv, raw, rawascii, ltspice, vcd, json, prn); else from the ending of -o
     #[arg(long, value_name = "FORMAT")]
     format: Option<String>,
     /// Head columns as `name [unit]`
@@ -89,14 +89,8 @@ fn rename_file(arguments: &Arguments, session: &mut Session) -> Result<(), Exit>
     let heading = Heading { title: arguments.trace.clone(), units: arguments.units };
     let (to, format) = (arguments.output.as_deref(), arguments.format.as_deref());
     let mut output = Output::open(to, format, heading, &trace.names, &trace.units, session)?;
-    let mut row = vec![0.0; trace.names.len()];
-    for at in 0..trace.rows() {
-        for (value, column) in row.iter_mut().zip(&trace.columns) {
-            *value = column[at];
-        }
-        let written = output.row(&row);
-        written.map_err(|error| session.unwritable(to.unwrap_or("<stdout>"), &error))?;
-    }
+    let written = send(&trace, &mut output);
+    written.map_err(|error| session.unwritable(to.unwrap_or("<stdout>"), &error))?;
     output.close(true, session)
 }
 
@@ -114,8 +108,10 @@ fn choose(map: &mut Map, all: bool) {
 /// out, with a note.
 fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
     let (netlist, places) = expressions(map);
-    let mut result = Trace::new(vec![trace.names[0].clone()], vec![trace.units[0].clone()]);
-    result.columns[0] = trace.columns[0].clone();
+    // The abscissa and what counts runs stay.
+    let kept = trace.abscissa() + 1;
+    let mut result = Trace::new(trace.names[..kept].to_vec(), trace.units[..kept].to_vec());
+    result.columns = trace.columns[..kept].to_vec();
     let mut lacking = vec![];
     for (variable, place) in map.variables.iter().zip(places) {
         let law = place.and_then(|at| match &netlist.cards[at].kind {
@@ -146,7 +142,7 @@ fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
         let note = Diagnostic::warning("W0931", Span::NONE, message);
         d.push(note.because(names.join(", ")).because(format!("the first needs `{missing}`")));
     }
-    if result.names.len() == 1 {
+    if result.names.len() == kept {
         let message = "no variable of the map can be told from the result";
         let help = "is the map of the netlist that was run?";
         d.push(Diagnostic::error("E0932", Span::NONE, message).help(help));

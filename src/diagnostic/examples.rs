@@ -202,6 +202,8 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0930" "not_a_map.expected"
     "E0932" "map_of_another.expected"
     "E0933" "time_no_number.expected"
+    "E0934" "dump_in_minutes.expected"
+    "E0935" "dump_of_phasors.expected"
     "E0940" "twice_stdin.expected"
     "E0941" "unknown_format.expected"
     "E0942" "nothing_to_compare.expected"

@@ -5,12 +5,17 @@
 //! equal time with different values in either trace; where a rise is stated (translated circuits have rises of
 //! step/1000 instead of jumps), also a change of more than [`STEEP`] of the range within one rise.
 //!
+//! Stepped traces are compared run by run, in their order. A run of one row whose first column is no abscissa (an
+//! operating point) is compared in every column.
+//!
 //! A reference that never changes has no range: its magnitude takes the place; for one that is 0 throughout, errors
 //! are absolute.
 
 use super::Trace;
 use super::resample::{place, value};
 use serde::Serialize;
+use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Part of the range by which a signal changes within one rise to be called a jump.
 pub const STEEP: f64 = 1e-3;
@@ -97,19 +102,17 @@ pub fn compare(trace: &Trace, reference: &Trace, settings: &Settings) -> Compari
     let pairs = match &settings.signals {
         Some(pairs) => pairs,
         None => {
-            every = reference.names.iter().skip(1).map(|n| (n.clone(), n.clone())).collect();
+            let skipped = reference.abscissa() + usize::from(!reference.is_point());
+            every = reference.names.iter().skip(skipped).map(|n| (n.clone(), n.clone())).collect();
             &every
         }
     };
     let mut comparison =
         Comparison { schema: 1, verdict: "same", signals: vec![], missing: vec![] };
+    let (trace, reference) = (Named::new(trace), Named::new(reference));
     for (theirs, ours) in pairs {
-        match (trace.column(ours), reference.column(theirs)) {
-            (Some(a), Some(b)) => {
-                let a = Column { time: trace.time(), values: a };
-                let b = Column { time: reference.time(), values: b };
-                comparison.signals.push(signal(theirs, a, b, settings));
-            }
+        match (trace.columns(ours), reference.columns(theirs)) {
+            (Some(a), Some(b)) => comparison.signals.push(signal(theirs, &a, &b, settings)),
             (None, _) => comparison.missing.push(ours.clone()),
             (_, None) => comparison.missing.push(theirs.clone()),
         }
@@ -120,18 +123,59 @@ pub fn compare(trace: &Trace, reference: &Trace, settings: &Settings) -> Compari
     comparison
 }
 
-/// A column over its abscissa.
-#[derive(Clone, Copy)]
-struct Column<'a> {
-    time: &'a [f64],
-    values: &'a [f64],
+/// A trace whose columns are found by name at once, and its runs.
+struct Named<'a> {
+    trace: &'a Trace,
+    places: HashMap<&'a str, usize>,
+    /// Those that differ from others by more than case, in lower case.
+    folded: HashMap<String, Option<usize>>,
+    runs: Vec<std::ops::Range<usize>>,
+    point: bool,
 }
 
-fn signal(name: &str, a: Column, b: Column, settings: &Settings) -> Signal {
-    let (low, high) = b
-        .values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+impl<'a> Named<'a> {
+    fn new(trace: &'a Trace) -> Named<'a> {
+        let names = trace.names.iter().enumerate();
+        let mut folded = HashMap::new();
+        for (at, name) in names.clone() {
+            folded.entry(name.to_lowercase()).and_modify(|place| *place = None).or_insert(Some(at));
+        }
+        let places = names.map(|(at, name)| (name.as_str(), at)).collect();
+        Named { trace, places, folded, runs: trace.runs(), point: trace.is_point() }
+    }
+
+    /// A column, as one over its abscissa for each run.
+    fn columns(&self, name: &str) -> Option<Vec<Column<'a>>> {
+        let folded = || self.folded.get(&name.to_lowercase()).copied().flatten();
+        let place = self.places.get(name).copied().or_else(folded)?;
+        let (trace, time) = (self.trace, self.trace.time());
+        let values = &trace.columns[place];
+        let run = |rows: &std::ops::Range<usize>| {
+            let (time, values) = (&time[rows.clone()], &values[rows.clone()]);
+            if self.point {
+                return Column { time: Cow::Owned(vec![0.0; rows.len()]), values: values.into() };
+            }
+            if time.first() > time.last() {
+                let turned = |column: &[f64]| Cow::Owned(column.iter().rev().copied().collect());
+                return Column { time: turned(time), values: turned(values) };
+            }
+            Column { time: time.into(), values: values.into() }
+        };
+        Some(self.runs.iter().map(run).collect())
+    }
+}
+
+/// A column over its abscissa, which rises.
+struct Column<'a> {
+    time: Cow<'a, [f64]>,
+    values: Cow<'a, [f64]>,
+}
+
+/// The error of a signal over all runs.
+fn signal(name: &str, a: &[Column], b: &[Column], settings: &Settings) -> Signal {
+    let all = b.iter().flat_map(|run| run.values.iter());
+    let (low, high) =
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     let range = if high >= low { high - low } else { 0.0 };
     let magnitude = low.abs().max(high.abs());
     let unit = match range {
@@ -139,23 +183,44 @@ fn signal(name: &str, a: Column, b: Column, settings: &Settings) -> Signal {
         0.0 => 1.0,
         _ => range,
     };
-    let interval = interval(b.time);
+    let mut result = Signal {
+        name: name.to_string(),
+        max: 0.0,
+        rms: 0.0,
+        at: b.first().and_then(|run| run.time.first()).copied().unwrap_or(0.0),
+        range,
+        tolerance: settings.tolerance,
+        skipped: 0,
+        uncovered: 0,
+    };
+    let (mut squares, mut counted) = (0.0, 0_usize);
+    let nothing = Column { time: Cow::Owned(vec![]), values: Cow::Owned(vec![]) };
+    for (at, b) in b.iter().enumerate() {
+        run(a.get(at).unwrap_or(&nothing), b, unit, settings, &mut result, |error| {
+            squares += error * error;
+            counted += 1;
+        });
+    }
+    result.rms = if counted > 0 { (squares / counted as f64).sqrt() } else { 0.0 };
+    result
+}
+
+/// Takes the errors of one run into the result.
+fn run(
+    a: &Column,
+    b: &Column,
+    unit: f64,
+    settings: &Settings,
+    result: &mut Signal,
+    mut count: impl FnMut(f64),
+) {
+    let interval = interval(&b.time);
     let rise = settings.rise.unwrap_or(interval / 1000.0);
     let mut jumps = jumps(b, unit, settings.rise);
     jumps.extend(self::jumps(a, unit, settings.rise));
     jumps.sort_by(|p, q| p.0.total_cmp(&q.0));
     // Times are sums of steps: a few last digits are no distance.
     let slack = rise + 1e-12 * b.time.last().map_or(0.0, |t| t.abs());
-    let mut result = Signal {
-        name: name.to_string(),
-        max: 0.0,
-        rms: 0.0,
-        at: b.time.first().copied().unwrap_or(0.0),
-        range,
-        tolerance: settings.tolerance,
-        skipped: 0,
-        uncovered: 0,
-    };
     let (first, last) = match (a.time.first(), a.time.last()) {
         (Some(first), Some(last)) => {
             // A simulator may write its first row one step after 0; a whole interval must not be missing.
@@ -165,9 +230,7 @@ fn signal(name: &str, a: Column, b: Column, settings: &Settings) -> Signal {
         _ => (f64::INFINITY, f64::NEG_INFINITY),
     };
     let mut jump = 0;
-    let mut squares = 0.0;
-    let mut counted = 0_usize;
-    for (&time, &wanted) in b.time.iter().zip(b.values) {
+    for (&time, &wanted) in b.time.iter().zip(b.values.iter()) {
         while jumps.get(jump).is_some_and(|(_, end)| end + slack < time) {
             jump += 1;
         }
@@ -176,21 +239,18 @@ fn signal(name: &str, a: Column, b: Column, settings: &Settings) -> Signal {
             continue;
         }
         let covered = first <= time && time <= last;
-        let Some(place) = place(a.time, time).filter(|_| covered) else {
+        let Some(place) = place(&a.time, time).filter(|_| covered) else {
             result.uncovered += 1;
             continue;
         };
-        let error = (value(a.values, place) - wanted).abs() / unit;
+        let error = (value(&a.values, place) - wanted).abs() / unit;
         let error = if error.is_nan() { f64::INFINITY } else { error };
-        squares += error * error;
-        counted += 1;
+        count(error);
         if error > result.max {
             result.max = error;
             result.at = time;
         }
     }
-    result.rms = if counted > 0 { (squares / counted as f64).sqrt() } else { 0.0 };
-    result
 }
 
 /// The middle one of the intervals that are not 0: the output interval of a run on a grid.
@@ -205,7 +265,7 @@ fn interval(time: &[f64]) -> f64 {
 }
 
 /// Where a column jumps: begin and end of each jump, in order.
-fn jumps(column: Column, unit: f64, rise: Option<f64>) -> Vec<(f64, f64)> {
+fn jumps(column: &Column, unit: f64, rise: Option<f64>) -> Vec<(f64, f64)> {
     let Column { time, values } = column;
     let mut found: Vec<(f64, f64)> = vec![];
     for row in 0..time.len() {

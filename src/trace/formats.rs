@@ -3,7 +3,9 @@
 use super::Trace;
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
+use std::collections::HashSet;
 use std::io::{self, Write};
+use std::ops::Range;
 
 /// What a format says beside the rows.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +30,12 @@ pub struct Format {
     pub read: fn(&[u8]) -> Result<Trace, Failed>,
     /// Whether a file that begins so is probably one.
     pub recognises: fn(&[u8]) -> bool,
+    /// Why it cannot hold columns of these names, where it cannot.
+    pub refuses: fn(&[String]) -> Option<&'static str>,
 }
+
+/// A format that holds columns of all names.
+const ANY: fn(&[String]) -> Option<&'static str> = |_| None;
 
 /// All formats; the first that recognises a file reads it.
 pub const FORMATS: &[Format] = &[
@@ -39,6 +46,34 @@ pub const FORMATS: &[Format] = &[
         write: super::raw::write,
         read: super::raw::read,
         recognises: super::raw::recognises,
+        refuses: ANY,
+    },
+    Format {
+        name: "rawascii",
+        endings: &[],
+        about: "ngspice's RAW as text",
+        write: super::raw::write_ascii,
+        read: super::raw::read,
+        recognises: super::raw::recognises,
+        refuses: ANY,
+    },
+    Format {
+        name: "ltspice",
+        endings: &[],
+        about: "LTspice's RAW, its header in UTF-16",
+        write: super::raw::write_ltspice,
+        read: super::raw::read,
+        recognises: super::raw::recognises,
+        refuses: ANY,
+    },
+    Format {
+        name: "vcd",
+        endings: &["vcd"],
+        about: "value change dump, times rounded to a time scale",
+        write: super::vcd::write,
+        read: super::vcd::read,
+        recognises: super::vcd::recognises,
+        refuses: super::vcd::refuses,
     },
     Format {
         name: "json",
@@ -47,6 +82,16 @@ pub const FORMATS: &[Format] = &[
         write: super::json::write,
         read: super::json::read,
         recognises: super::json::recognises,
+        refuses: ANY,
+    },
+    Format {
+        name: "prn",
+        endings: &["prn", "dat", "print"],
+        about: "a table of blanks, as Xyce writes it",
+        write: super::prn::write,
+        read: super::prn::read,
+        recognises: super::prn::recognises,
+        refuses: ANY,
     },
     Format {
         name: "csv",
@@ -55,6 +100,7 @@ pub const FORMATS: &[Format] = &[
         write: super::csv::write,
         read: super::csv::read,
         recognises: |bytes| !bytes.contains(&0),
+        refuses: ANY,
     },
 ];
 
@@ -86,25 +132,38 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Trace, Failed> {
     })
 }
 
-/// A trace must have an abscissa that does not fall, and no two columns of one name.
+/// A trace must have an abscissa that does not turn back within a run, and no two columns of one name.
 fn check(trace: &Trace) -> Result<(), Failed> {
     if trace.names.is_empty() || trace.rows() == 0 {
         return Err(bad("E0924", "the trace has no rows"));
     }
-    for (at, name) in trace.names.iter().enumerate() {
-        if trace.names[..at].contains(name) {
-            return Err(bad("E0925", format!("two columns are called `{name}`")));
-        }
+    let mut seen = HashSet::new();
+    if let Some(name) = trace.names.iter().find(|name| !seen.insert(name.as_str())) {
+        return Err(bad("E0925", format!("two columns are called `{name}`")));
     }
-    let time = trace.time();
-    if let Some(row) =
-        time.windows(2).position(|pair| pair[0].partial_cmp(&pair[1]).is_none_or(|o| o.is_gt()))
-    {
-        let (a, b) = (time[row], time[row + 1]);
-        let message = format!("`{}` goes from {a} to {b}", trace.names[0]);
-        return Err(worse("E0926", message, format!("at row {} of {}", row + 2, time.len())));
+    if trace.is_stepped() {
+        rises(trace, 0, 0..trace.rows())?;
     }
-    Ok(())
+    let at = trace.abscissa();
+    trace.runs().into_iter().try_for_each(|run| rises(trace, at, run))
+}
+
+/// Whether an abscissa holds numbers and does not turn back. Only a sweep may fall.
+fn rises(trace: &Trace, at: usize, rows: Range<usize>) -> Result<(), Failed> {
+    let column = &trace.columns[at];
+    let name = &trace.names[at];
+    let (first, last) = (column[rows.start], column[rows.end - 1]);
+    let sweep =
+        at == trace.abscissa() && !["time", "frequency"].contains(&name.to_lowercase().as_str());
+    let sign = if sweep && last < first { -1.0 } else { 1.0 };
+    let backwards = |row: &usize| {
+        let before = if *row > rows.start { column[row - 1] } else { column[*row] };
+        (sign * before).partial_cmp(&(sign * column[*row])).is_none_or(|order| order.is_gt())
+    };
+    let Some(row) = rows.clone().find(backwards) else { return Ok(()) };
+    let before = column[if row > rows.start { row - 1 } else { row }];
+    let message = format!("`{name}` goes from {before} to {}", column[row]);
+    Err(worse("E0926", message, format!("at row {} of {}", row + 1, trace.rows())))
 }
 
 /// Why a trace cannot be read.
@@ -151,7 +210,7 @@ pub(super) mod tests {
                     t.columns.iter().map(|c| c.iter().map(|v| v.to_bits()).collect()).collect()
                 };
                 assert_eq!(bits(&back), bits(&trace), "{}", format.name);
-                if format.name != "raw" {
+                if ["csv", "json"].contains(&format.name) {
                     assert_eq!(back.names, trace.names, "{}", format.name);
                 }
             }
@@ -179,6 +238,12 @@ pub(super) mod tests {
             (b"time,x,x\n0,1,2\n", "E0925"),
             (b"time,x\n1,1\n0,2\n", "E0926"),
             (b"time,x\nNaN,1\n0,2\n", "E0926"),
+            (b"time,x\nNaN,1\n", "E0926"),
+            (b"step,time,x\n1,1,1\n1,0,1\n", "E0926"),
+            (b"step,time,x\n2,0,1\n1,0,1\n", "E0926"),
+            (b"t x\n0 1\n1 one\n", "E0921"),
+            (b"$timescale 7 ns $end", "E0934"),
+            (b"$enddefinitions $end\n", "E0924"),
             (b"{\"schema\": 1}", "E0923"),
             (b"{\"schema\": 1, \"names\": [\"t\"], \"columns\": [[1], [2]]}", "E0923"),
             (b"Title: x\nPlotname: y\n", "E0922"),

@@ -1,16 +1,20 @@
 //! Traces: names, columns, formats, resampling, comparison.
 
+pub mod runs;
 pub mod compare;
 pub mod resample;
 pub mod formats;
 pub mod csv;
 pub mod raw;
 pub mod json;
+pub mod vcd;
+pub mod prn;
 
 /// Columns over a common abscissa.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// Headers; the first is `time`.
+    /// Headers; the first is the abscissa (`time`, `frequency`, the source of a sweep), or `step` before it where there
+    /// are several runs.
     pub names: Vec<String>,
     /// Units, one for each name; empty where none is known.
     pub units: Vec<String>,
@@ -28,12 +32,12 @@ impl Trace {
 
     /// The abscissa, mostly time in seconds; empty where there are no columns.
     pub fn time(&self) -> &[f64] {
-        self.columns.first().map_or(&[], Vec::as_slice)
+        self.columns.get(self.abscissa()).map_or(&[], Vec::as_slice)
     }
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.time().len()
+        self.columns.first().map_or(0, Vec::len)
     }
 
     /// The column of a name; where none is spelled so, the only one that differs by case alone, as SPICE folds case.
@@ -70,4 +74,19 @@ impl Sink for Trace {
         }
         Ok(())
     }
+}
+
+/// Sends every row of a trace to a sink.
+///
+/// # Errors
+/// What writing failed with.
+pub fn send(trace: &Trace, sink: &mut dyn Sink) -> std::io::Result<()> {
+    let mut row = vec![0.0; trace.columns.len()];
+    for at in 0..trace.rows() {
+        for (value, column) in row.iter_mut().zip(&trace.columns) {
+            *value = column[at];
+        }
+        sink.row(&row)?;
+    }
+    Ok(())
 }

@@ -35,15 +35,22 @@ pub fn value(column: &[f64], place: Place) -> f64 {
     }
 }
 
-/// The trace at other times; end values hold outside.
+/// The trace at other times, each run of a stepped one; end values hold outside.
 pub fn resample(trace: &Trace, times: &[f64]) -> Trace {
     let mut result = Trace::new(trace.names.clone(), trace.units.clone());
-    let places: Vec<Place> = times.iter().filter_map(|t| place(trace.time(), *t)).collect();
-    for (to, from) in result.columns.iter_mut().zip(&trace.columns).skip(1) {
-        to.extend(places.iter().map(|place| value(from, *place)));
-    }
-    if let Some(first) = result.columns.first_mut() {
-        first.extend(&times[..places.len()]);
+    let abscissa = trace.abscissa();
+    for run in trace.runs() {
+        let time = &trace.time()[run.clone()];
+        let places: Vec<Place> = times.iter().filter_map(|t| place(time, *t)).collect();
+        for (at, (to, from)) in result.columns.iter_mut().zip(&trace.columns).enumerate() {
+            if at == abscissa {
+                to.extend(&times[..places.len()]);
+            } else if at < abscissa {
+                to.extend(places.iter().map(|_| from[run.start]));
+            } else {
+                to.extend(places.iter().map(|place| value(&from[run.clone()], *place)));
+            }
+        }
     }
     result
 }
@@ -51,6 +58,7 @@ pub fn resample(trace: &Trace, times: &[f64]) -> Trace {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trace::Sink;
 
     #[test]
     fn lines_jumps_and_ends() {
@@ -61,5 +69,12 @@ mod tests {
         assert_eq!(other.columns[0], times);
         assert_eq!(other.columns[1], [0.0, 0.0, 0.5, 10.0, 8.0, 6.0, 6.0]);
         assert_eq!(place(&[], 1.0), None);
+        trace.count_runs();
+        trace.row(&[2.0, 0.0, 7.0]).unwrap();
+        let other = resample(&trace, &[0.5, 2.0]);
+        assert_eq!(
+            other.columns,
+            [[1.0, 1.0, 2.0, 2.0], [0.5, 2.0, 0.5, 2.0], [1.0, 8.0, 7.0, 7.0]]
+        );
     }
 }
