@@ -23,9 +23,18 @@ impl Device {
         visit(Reference::Terminals(&mut self.nodes));
         match &mut self.element {
             Element::Resistor { value } => visit(Reference::Expr(value)),
-            Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {
+            Element::Capacitor { value, initial }
+            | Element::Inductor { value, initial }
+            | Element::Charge { law: value, initial }
+            | Element::Flux { law: value, initial } => {
                 visit(Reference::Expr(value));
                 initial.iter_mut().for_each(|initial| visit(Reference::Expr(initial)));
+            }
+            Element::Passive(passive) => {
+                passive.model.iter_mut().for_each(|model| visit(Reference::Model(model)));
+                let values = passive.value.iter_mut().chain(&mut passive.initial);
+                values.for_each(|value| visit(Reference::Expr(value)));
+                passive.parameters.iter_mut().for_each(|(_, value)| visit(Reference::Expr(value)));
             }
             Element::Mutual { inductors, coupling } => {
                 inductors.iter_mut().for_each(|inductor| visit(Reference::Device(inductor)));
@@ -58,7 +67,12 @@ impl Device {
                 visit(Reference::Device(control));
                 visit(Reference::Model(model));
             }
-            Element::Diode { model, area } => {
+            Element::LawSwitch { model, control, .. } => {
+                visit(Reference::Expr(control));
+                visit(Reference::Model(model));
+            }
+            Element::Diode { model, area, parameters } => {
+                parameters.iter_mut().for_each(|(_, value)| visit(Reference::Expr(value)));
                 visit(Reference::Model(model));
                 area.iter_mut().for_each(|area| visit(Reference::Expr(area)));
             }
@@ -74,6 +88,13 @@ fn source(source: &mut Source, visit: &mut dyn FnMut(Reference)) {
         Waveform::Constant(value) => visit(Reference::Expr(value)),
         Waveform::Function { arguments, .. } => {
             arguments.iter_mut().for_each(|argument| visit(Reference::Expr(argument)));
+        }
+        Waveform::Points { points, repeat, delay } => {
+            let values = points.iter_mut().chain(repeat).chain(delay);
+            values.for_each(|value| visit(Reference::Expr(value)));
+        }
+        Waveform::Pattern { arguments, repeat, .. } => {
+            arguments.iter_mut().chain(repeat).for_each(|value| visit(Reference::Expr(value)));
         }
     }
     source.dc.iter_mut().for_each(|value| visit(Reference::Expr(value)));

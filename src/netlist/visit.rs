@@ -1,11 +1,17 @@
 //! Every expression of a card, for what has to look at or change all of them.
 
-use super::{Card, CardKind, Device, Element, Expr, Source, Waveform};
+use super::analysis::{Analysis, Points, Sweep};
+use super::references::Reference;
+use super::{Card, CardKind, Expr};
 
 /// Calls `visit` for each expression of a card, but not of the cards within a subcircuit or a choice.
 pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut card.kind {
-        CardKind::Device(device) => device_mut(device, visit),
+        CardKind::Device(device) => device.references(&mut |reference| {
+            if let Reference::Expr(expr) = reference {
+                visit(expr);
+            }
+        }),
         CardKind::Parameters(values) | CardKind::Initial(values) | CardKind::Guess(values) => {
             values.iter_mut().for_each(|(_, value)| visit(value));
         }
@@ -24,6 +30,9 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             visit(stop);
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
+        CardKind::Analysis(analysis) => analysis_mut(analysis, visit),
+        CardKind::Step(sweeps) => sweeps.iter_mut().for_each(|sweep| sweep_mut(sweep, visit)),
+        CardKind::Data(data) => data.values.iter_mut().for_each(visit),
         CardKind::Function(_)
         | CardKind::Global(_)
         | CardKind::Options(_)
@@ -32,50 +41,37 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
     }
 }
 
-fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
-    match &mut source.waveform {
-        Waveform::Constant(value) => visit(value),
-        Waveform::Function { arguments, .. } => arguments.iter_mut().for_each(&mut *visit),
+fn analysis_mut(analysis: &mut Analysis, visit: &mut dyn FnMut(&mut Expr)) {
+    match analysis {
+        Analysis::Dc(sweeps) => sweeps.iter_mut().for_each(|sweep| sweep_mut(sweep, visit)),
+        Analysis::Ac(points) => points_mut(points, visit),
+        Analysis::Transfer { output, .. } => visit(&mut output.1),
+        Analysis::PoleZero { .. } => {}
+        Analysis::Fourier { frequency, items } => {
+            visit(frequency);
+            items.iter_mut().for_each(|(_, item)| visit(item));
+        }
+        Analysis::Sensitivity { items, frequencies } => {
+            items.iter_mut().for_each(|(_, item)| visit(item));
+            frequencies.iter_mut().for_each(|points| points_mut(points, visit));
+        }
     }
-    source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
 }
 
-fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
-    match &mut device.element {
-        Element::Resistor { value } => visit(value),
-        Element::Capacitor { value, initial }
-        | Element::Inductor { value, initial }
-        | Element::Charge { law: value, initial }
-        | Element::Flux { law: value, initial } => {
-            visit(value);
-            initial.iter_mut().for_each(visit);
-        }
-        Element::Passive(passive) => {
-            passive.value.iter_mut().chain(&mut passive.initial).for_each(&mut *visit);
-            passive.parameters.iter_mut().for_each(|(_, value)| visit(value));
-        }
-        Element::Mutual { coupling, .. } => visit(coupling),
-        Element::VoltageSource(source) | Element::CurrentSource(source) => {
-            source_mut(source, visit);
-        }
-        Element::Vcvs { gain, .. }
-        | Element::Vccs { gain, .. }
-        | Element::Cccs { gain, .. }
-        | Element::Ccvs { gain, .. } => visit(gain),
-        Element::Line { impedance, delay, initial } => {
-            visit(impedance);
-            visit(delay);
-            initial.iter_mut().flatten().for_each(visit);
-        }
-        Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
-        Element::Switch { .. } | Element::CurrentSwitch { .. } => {}
-        Element::LawSwitch { control, .. } => visit(control),
-        Element::Diode { area, parameters, .. } => {
-            area.iter_mut().for_each(&mut *visit);
-            parameters.iter_mut().for_each(|(_, value)| visit(value));
-        }
-        Element::Instance { parameters, .. } => {
-            parameters.iter_mut().for_each(|(_, value)| visit(value));
-        }
+fn sweep_mut(sweep: &mut Sweep, visit: &mut dyn FnMut(&mut Expr)) {
+    match sweep {
+        Sweep::Quantity { points, .. } => points_mut(points, visit),
+        Sweep::Table { .. } => {}
+    }
+}
+
+fn points_mut(points: &mut Points, visit: &mut dyn FnMut(&mut Expr)) {
+    match points {
+        Points::Linear(values)
+        | Points::Count(values)
+        | Points::Decade(values)
+        | Points::Octave(values) => values.iter_mut().for_each(visit),
+        Points::List(values) => values.iter_mut().for_each(visit),
+        Points::Table(_) => {}
     }
 }

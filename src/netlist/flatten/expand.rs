@@ -89,7 +89,7 @@ pub fn expand_with<'n>(
     };
     flat.scopes.all.push(Scope::default());
     flat.scopes.temperature =
-        variation.temperature.or_else(|| stated_temperature(&netlist.cards)).unwrap_or(ROOM);
+        variation.temperature.or_else(|| stated_temperature(netlist)).unwrap_or(ROOM);
     let ground = netlist.names.find("0");
     let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
@@ -118,13 +118,14 @@ pub fn expand_with<'n>(
 }
 
 /// The circuit's temperature in °C, where an option states it. One that cannot be read is told of elsewhere.
-fn stated_temperature(cards: &[Card]) -> Option<f64> {
-    let options = cards.iter().filter_map(|card| match &card.kind {
+fn stated_temperature(netlist: &Netlist) -> Option<f64> {
+    let numbers = netlist.dialect.reading().numbers;
+    let options = netlist.cards.iter().filter_map(|card| match &card.kind {
         CardKind::Options(options) => Some(options),
         _ => None,
     });
     let texts = options.flatten().filter(|(key, _)| key == "temp");
-    texts.filter_map(|(_, text)| number::number(text)).last().map(|read| read.value)
+    texts.filter_map(|(_, text)| number::number(text, numbers)).last().map(|read| read.value)
 }
 
 struct Expander<'n> {

@@ -12,7 +12,6 @@ use crate::circuit::{
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
 use crate::netlist::{Element, Expr, Name, PassiveKind, Source, Waveform};
-use crate::quantity::nearest;
 
 /// Every device of a flat netlist. One that is wrong becomes a resistor, with an error, so that the others keep their
 /// numbers.

@@ -12,6 +12,7 @@
 
 use super::expand::Pending;
 use super::models::{self, Key, Kind, OPEN, Values};
+use super::scope;
 use super::values::Lookup;
 use crate::circuit::{self, DeviceKind, LawOf};
 use crate::diagnostic::Diagnostic;
@@ -81,7 +82,8 @@ pub fn kind(
         None => None,
     };
     let factor = factor(lookup, passive.kind, &own, model);
-    let law = passive.value.as_ref().filter(|v| scope::varies(&lookup.flat.scopes, pending.scope, v));
+    let law =
+        passive.value.as_ref().filter(|v| scope::varies(&lookup.flat.scopes, pending.scope, v));
     if let Some(law) = law {
         let law = lookup.law(pending.scope, law, d)?;
         let law = match factor == 1.0 {

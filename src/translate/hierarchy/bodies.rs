@@ -116,7 +116,7 @@ impl Rename<'_, '_> {
                     Leaf::Voltage(self.node(*plus, block), (!ground).then_some(minus))
                 }
                 Leaf::Current(device) => Leaf::Current(self.device(*device)),
-                Leaf::Time => Leaf::Time,
+                other => other.clone(),
             };
             Expr::new(Node::Leaf(leaf), span)
         })

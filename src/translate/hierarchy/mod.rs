@@ -36,8 +36,8 @@ use parts::Part;
 use ports::Blocks;
 use std::collections::HashMap;
 use tree::Tree;
-use words::Words;
 use variants::{Body, Definitions, Public};
+use words::Words;
 
 /// A circuit with subcircuits.
 #[derive(Clone, Debug)]
@@ -187,8 +187,10 @@ impl Writer<'_> {
         let depths: Vec<usize> = scopes.iter().map(|scope| self.tree.depth(*scope)).collect();
         let mut subcircuits = vec![];
         for depth in (1..=depths.iter().copied().max().unwrap_or(0)).rev() {
-            let level: Vec<u32> =
-                (scopes.iter().zip(&depths)).filter(|(_, d)| **d == depth).map(|(s, _)| *s).collect();
+            let level: Vec<u32> = (scopes.iter().zip(&depths))
+                .filter(|(_, d)| **d == depth)
+                .map(|(s, _)| *s)
+                .collect();
             let bodies: Vec<Body> =
                 level.iter().map(|scope| self.body(*scope, &uses, &mut names)).collect();
             let found: Vec<usize> =
@@ -199,8 +201,10 @@ impl Writer<'_> {
                 let differs = definition.vary(&members);
                 for k in own() {
                     let given = bodies[k].publics.iter();
-                    let given = given.filter_map(|public| Some((public.name, public.given.clone()?)));
-                    let lifts = bodies[k].lifts.iter().zip(&differs).filter(|(_, differs)| **differs);
+                    let given =
+                        given.filter_map(|public| Some((public.name, public.given.clone()?)));
+                    let lifts =
+                        bodies[k].lifts.iter().zip(&differs).filter(|(_, differs)| **differs);
                     let own = lifts.map(|(lift, _)| lift.clone()).collect();
                     let subcircuit = definition.name;
                     let name = self.tree.instances[level[k] as usize].name.clone();
@@ -221,7 +225,7 @@ impl Writer<'_> {
         cards.splice(0..0, inlined.iter().map(comment));
         let (header, map) = told::told(self.naming, self.tree, &mut names, &mut cards);
         let title = self.flat.netlist.title.clone();
-        let netlist = Netlist { title, names: names.names, header, cards };
+        let netlist = Netlist { title, names: names.names, header, cards, ..Netlist::default() };
         Hierarchy { netlist, map, inlined, subcircuits }
     }
 

@@ -74,7 +74,7 @@ impl Part {
             Leaf::Parameter(name) => self.parameters.push(*name),
             Leaf::Voltage(plus, minus) => self.nodes.extend([*plus].into_iter().chain(*minus)),
             Leaf::Current(name) => self.devices.push(*name),
-            Leaf::Time => {}
+            _ => {}
         });
     }
 }

@@ -5,6 +5,7 @@ use super::naming::Naming;
 use super::tree::Tree;
 use super::words::Words;
 use crate::expr::Node;
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
 use crate::netlist::{Card, CardKind, Expr, Leaf, Name, write};
@@ -50,7 +51,8 @@ pub fn told(
     }
     let mut flat_names = flat.names.clone();
     for column in &mut header.columns {
-        let read = expression(&column.expr, &mut flat_names, FileId(u32::MAX), 0, &mut vec![]);
+        let read =
+            expression(&column.expr, &mut flat_names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
         if let Some(expr) = read {
             let expr = paths.expr(&expr);
             column.expr = write::expression(&paths.names.names, &expr);
@@ -106,7 +108,7 @@ impl Paths<'_, '_> {
                     Leaf::Voltage(self.node(*plus), minus)
                 }
                 Leaf::Current(device) => Leaf::Current(self.device(*device)),
-                Leaf::Time => Leaf::Time,
+                other => other.clone(),
             };
             Expr::new(Node::Leaf(leaf), span)
         })
