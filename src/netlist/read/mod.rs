@@ -14,7 +14,10 @@ pub mod options;
 pub mod number;
 pub mod cursor;
 pub mod expression;
+pub mod calls;
 pub mod waveforms;
+pub mod passive;
+pub mod linked;
 pub mod devices;
 pub mod cards;
 
