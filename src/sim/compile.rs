@@ -214,11 +214,16 @@ impl<'a> Builder<'a> {
         let n = self.unknowns.len();
         let mut slopes: Vec<(u32, u32)> = vec![];
         let mut curved_charges = vec![];
+        // Equations that a law moves over time.
+        let mut moved: Vec<u32> = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
-                let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
+                let all = dag.inputs_of(law.node);
+                let timed = all.iter().any(|input| *input >= n as u32);
+                let inputs = all.into_iter().filter(|input| *input < n as u32);
                 match &law.target {
                     Target::Equations(into) => {
+                        moved.extend(into.iter().filter(|_| timed).map(|(row, _)| *row));
                         for input in inputs {
                             slopes.extend(into.iter().map(|(row, _)| (*row, input)));
                         }
@@ -245,6 +250,9 @@ impl<'a> Builder<'a> {
             }
             for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
                 constant[row.0 as usize] = None;
+            }
+            for row in &moved {
+                constant[*row as usize] = None;
             }
             let mut charges = self.charge_entries.clone();
             charges.extend(curved_charges.iter().map(|(k, input)| (*k, *input, 1.5)));
@@ -375,6 +383,7 @@ impl<'a> Builder<'a> {
             initial: stamps.initial.iter().map(|(node, value)| (node.0, *value)).collect(),
             curved: self.curved,
             held: self.dependent.iter().map(|dependent| !dependent).collect(),
+            pinned: stamps.charges.iter().map(|charge| charge.pinned).collect(),
             groups,
             sources: stamps
                 .sources

@@ -110,7 +110,7 @@ pub(crate) fn operating_point(
     let targets = state.q.clone();
     network.pin_initial = true;
     let result = settle_modes(network, state, slides, |network, state| {
-        let mut held = vec![false; network.system.charges()];
+        let mut held = network.system.pinned.clone();
         loop {
             match find(network, &held, &targets, floors, state, true, scratch) {
                 Err(Cut::Singular(singular)) => {

@@ -32,7 +32,8 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     usage::check(netlist, &header, diagnostics);
     let mut flat = expand::expand(netlist, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
-    let times = sources::Times::of(&analyses);
+    let zero_is_jump = flat.zero_is_jump();
+    let times = sources::Times { zero_is_jump, ..sources::Times::of(&analyses) };
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
@@ -49,6 +50,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         outputs,
         options,
         grid: header.grid,
+        initial_holds: netlist.dialect.reading().initial_holds,
         ..Circuit::default()
     };
     experiment::scales(&mut circuit, &header, diagnostics);
