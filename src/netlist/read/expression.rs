@@ -203,14 +203,17 @@ impl Language for Spice<'_> {
                 if rule == Rule::braced || rule == Rule::quoted {
                     return parse::expression(self, parts.next()?, d);
                 }
-                let first = parts.next()?.as_str();
+                // Within a probe a colon is part of a name anyway.
+                let plain = |text: &str| text.replace(COLON, ":");
+                let first = plain(parts.next()?.as_str());
+                let first = first.as_str();
                 if rule == Rule::current {
                     Node::Leaf(Leaf::Current(self.names.intern(first)))
                 } else {
                     let grounds = self.reading.grounds;
                     let mut node = |word| node_name(self.names, grounds, word);
                     let first = node(first);
-                    let second = parts.next().map(|part| node(part.as_str()));
+                    let second = parts.next().map(|part| node(&plain(part.as_str())));
                     Node::Leaf(Leaf::Voltage(first, second))
                 }
             }
