@@ -108,6 +108,10 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
+    let system = network.system;
+    for (unknown, value) in system.guesses.iter().chain(&system.initial) {
+        state.x[*unknown as usize] = *value;
+    }
     network.pin_initial = true;
     let result = settle_modes(network, state, slides, |network, state| {
         let mut held = network.system.pinned.clone();

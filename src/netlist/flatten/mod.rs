@@ -14,6 +14,7 @@ mod sources;
 mod operators;
 mod transfer;
 mod experiment;
+mod guess;
 mod usage;
 
 use super::{Netlist, header::Header};
@@ -37,7 +38,8 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
-    let guesses = experiment::guesses(&flat, diagnostics);
+    let mut guesses = experiment::guesses(&flat, diagnostics);
+    guess::follow(&devices, flat.nodes.len(), &mut guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {

@@ -211,7 +211,7 @@ impl Language for Spice<'_> {
                     Node::Leaf(Leaf::Current(self.names.intern(first)))
                 } else {
                     let grounds = self.reading.grounds;
-                    let mut node = |word| node_name(self.names, grounds, word);
+                    let mut node = |word: &str| node_name(self.names, grounds, word);
                     let first = node(first);
                     let second = parts.next().map(|part| node(&plain(part.as_str())));
                     Node::Leaf(Leaf::Voltage(first, second))
