@@ -66,16 +66,23 @@ fn gallery() -> &'static [Bad] {
     })
 }
 
+/// Copies a folder and all below it.
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir(to).unwrap();
+    for path in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap().path()) {
+        let to = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &to);
+        } else {
+            std::fs::copy(&path, to).unwrap();
+        }
+    }
+}
+
 /// Runs a command line in a folder that holds the file and those in `with/`; the messages in the form named.
 fn run(name: &str, bytes: Option<&[u8]>, command: &[String], form: &[&str]) -> Said {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("with")).unwrap();
-    if let Ok(entries) = std::fs::read_dir(self::folder().join("with")) {
-        for path in entries.map(|entry| entry.unwrap().path()) {
-            std::fs::copy(&path, folder.path().join("with").join(path.file_name().unwrap()))
-                .unwrap();
-        }
-    }
+    copy(&self::folder().join("with"), &folder.path().join("with"));
     if let Some(bytes) = bytes {
         std::fs::write(folder.path().join(name), bytes).unwrap();
     }

@@ -193,12 +193,13 @@ impl<'a> Stamper<'a> {
                 .map(|output| (output.name.clone(), self.law(&output.expr)))
                 .collect()
         };
-        self.stamps.initial = self
-            .circuit
-            .initial
-            .iter()
-            .filter_map(|(node, value)| self.node(*node).map(|unknown| (unknown, *value)))
-            .collect();
+        let known = |values: &[(NodeId, f64)]| {
+            let of =
+                |(node, value): &(NodeId, f64)| self.node(*node).map(|unknown| (unknown, *value));
+            values.iter().filter_map(of).collect()
+        };
+        (self.stamps.initial, self.stamps.guesses) =
+            (known(&self.circuit.initial), known(&self.circuit.guesses));
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps
     }

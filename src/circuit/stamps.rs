@@ -194,6 +194,8 @@ pub struct Stamps {
     /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`; capacitors have
     /// taken theirs already), or held while the operating point is sought. The last of several wins.
     pub initial: Vec<(UnknownId, f64)>,
+    /// Where to look for an operating point.
+    pub guesses: Vec<(UnknownId, f64)>,
     /// Names and places, indexed by [`DeviceId`].
     pub devices: Vec<DeviceLabel>,
 }

@@ -225,6 +225,7 @@ macro_rules! beside {
 
 /// Files that examples read, each by the name that they call it by.
 pub const BESIDE: &[(&str, &str)] = beside! {
+    "with/divider.inc"
     "with/torn.csv"
 };
 

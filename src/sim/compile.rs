@@ -217,12 +217,16 @@ impl<'a> Builder<'a> {
         // Laws of time or of modes alone have no slope, and yet they move what stands in their equations.
         let mut lawful = vec![];
         let mut curved_charges = vec![];
+        // Equations that a law moves over time.
+        let mut moved: Vec<u32> = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
-                let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
+                let all = dag.inputs_of(law.node);
+                let timed = all.iter().any(|input| *input >= n as u32);
+                let inputs = all.into_iter().filter(|input| *input < n as u32);
                 match &law.target {
                     Target::Equations(into) => {
-                        lawful.extend(into.iter().map(|(row, _)| *row));
+                        moved.extend(into.iter().filter(|_| timed).map(|(row, _)| *row));
                         for input in inputs {
                             slopes.extend(into.iter().map(|(row, _)| (*row, input)));
                         }
@@ -250,7 +254,7 @@ impl<'a> Builder<'a> {
             for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
                 constant[row.0 as usize] = None;
             }
-            for row in &lawful {
+            for row in &moved {
                 constant[*row as usize] = None;
             }
             let mut charges = self.charge_entries.clone();
@@ -380,8 +384,10 @@ impl<'a> Builder<'a> {
             rates,
             initial_charges: stamps.charges.iter().map(|charge| charge.initial).collect(),
             initial: stamps.initial.iter().map(|(node, value)| (node.0, *value)).collect(),
+            guesses: stamps.guesses.iter().map(|(node, value)| (node.0, *value)).collect(),
             curved: self.curved,
             held: self.dependent.iter().map(|dependent| !dependent).collect(),
+            pinned: stamps.charges.iter().map(|charge| charge.pinned).collect(),
             groups,
             sources: stamps
                 .sources

@@ -115,11 +115,15 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
+    let system = network.system;
+    for (unknown, value) in system.guesses.iter().chain(&system.initial) {
+        state.x[*unknown as usize] = *value;
+    }
     network.pin_initial = true;
     let mut held = vec![false; network.system.charges()];
     let mut tied = vec![];
     let result = settle_modes(network, state, slides, |network, state| {
-        held.fill(false);
+        held.copy_from_slice(&network.system.pinned);
         tied.clear();
         loop {
             let question = Question { held: &held, targets: &targets, floors, prime: true };

@@ -208,10 +208,14 @@ pub struct System {
     pub(crate) initial_charges: Vec<Option<f64>>,
     /// Initial node voltages of `.ic`.
     pub(crate) initial: Vec<(u32, f64)>,
+    /// Unknowns and where to look for them in an operating point.
+    pub(crate) guesses: Vec<(u32, f64)>,
     /// Whether a charge has a non-linear part.
     pub(crate) curved: Vec<bool>,
     /// Whether a charge is a state; the others follow from these.
     pub(crate) held: Vec<bool>,
+    /// Charges that an operating point holds at their initial values.
+    pub(crate) pinned: Vec<bool>,
     pub(crate) groups: Vec<LawGroup>,
     pub(crate) sources: Vec<Source>,
     pub(crate) memories: Vec<MemoryData>,

@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn bad_bytes_are_named_with_their_place() {
         let mut map = SourceMap::default();
-        let error = decode("a", b"1:x\n  \xFF -> 0:y\nmore".to_vec(), &mut map).unwrap_err();
+        let error = decode("a.bg", b"1:x\n  \xFF -> 0:y\nmore".to_vec(), &mut map).unwrap_err();
         let LoadErrorKind::NotUtf8 { offset: 6, span } = error.kind else { panic!("{error:?}") };
         assert_eq!(map.position(span), Some((2, 3)));
         let error = decode("b", b"\x7fELF\x00\x01".to_vec(), &mut map).unwrap_err();

@@ -35,6 +35,9 @@ pub fn settings(
                 if let (Some(step), Some(stop), Some(start), Some(hmax)) = (step, stop, start, hmax)
                 {
                     let hmax = hmax.filter(|limit| *limit > 0.0 && !header.hmax_auto);
+                    // Only ngspice needs a step; to the others 0 says that any will do.
+                    let open = step == 0.0 && flat.netlist.dialect.name != NGSPICE.name;
+                    let step = if open { stop / 1000.0 } else { step };
                     let sound =
                         step > 0.0 && stop > start && start >= 0.0 && (step + stop).is_finite();
                     if !sound {

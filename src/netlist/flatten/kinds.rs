@@ -1,9 +1,9 @@
 //! The second pass: what each device is.
 
 use super::expand::{Flat, Pending};
+use super::scope;
 use super::models::{self, Key, Kind, OPEN};
 use super::passive;
-use super::scope;
 use super::sources::{self, Times};
 use super::values::Lookup;
 use crate::circuit::{
@@ -127,6 +127,9 @@ fn kind(
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
             DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
+        }
+        Element::CurrentSource(Source { waveform: Waveform::Constant(law), .. }) if varies(law) => {
+            DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }
         }
         Element::CurrentSource(source) => {
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);

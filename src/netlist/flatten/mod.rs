@@ -15,6 +15,7 @@ mod operators;
 mod transfer;
 mod analyses;
 mod experiment;
+mod guess;
 mod usage;
 pub mod vary;
 
@@ -50,14 +51,16 @@ pub fn flatten_with(
         .iter()
         .rev()
         .find(|analysis| picked.is_none_or(|picked| picked == analysis.name()));
-    let times = sources::Times::of(&analyses);
-    let guesses = experiment::guesses(&flat, diagnostics);
+    let zero_is_jump = flat.zero_is_jump();
+    let times = sources::Times { zero_is_jump, ..sources::Times::of(&analyses) };
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     if let Some(temperature) = variation.temperature {
         flat.temperature = temperature;
     }
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
+    let mut guesses = experiment::guesses(&flat, diagnostics);
+    guess::follow(&devices, flat.nodes.len(), &mut guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
@@ -71,6 +74,7 @@ pub fn flatten_with(
         outputs,
         options,
         grid: header.grid,
+        initial_holds: netlist.dialect.reading().initial_holds,
         ..Circuit::default()
     };
     experiment::scales(&mut circuit, &header, diagnostics);

@@ -42,6 +42,8 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("global", Read(global)),
     ("temp", Read(temperature)),
     ("preprocess", Read(preprocess)),
+    // How a schematic is to show its results.
+    ("backanno", Read(|_, _| None)),
     ("save", Read(|reader, cursor| save(reader, cursor, false))),
     ("print", Read(|reader, cursor| save(reader, cursor, true))),
     ("tran", Read(transient)),
@@ -192,7 +194,7 @@ fn function(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
 fn definition(reader: &mut Reader, cursor: &mut Cursor, word: (&str, usize)) -> Option<Definition> {
     let span = cursor.span(reader, word.1, word.1 + word.0.len());
     if !cursor.take(b'(') {
-        reader.missing(cursor, "the arguments of the function, `f(x, y)`,");
+        reader.missing(cursor, "a list of arguments, `(x, y)`,");
         return None;
     }
     let mut arguments: Vec<&str> = vec![];
@@ -359,7 +361,8 @@ fn voltages(reader: &mut Reader, cursor: &mut Cursor) -> Option<Vec<(Name, Expr)
 fn transient(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     let (mut values, mut uic) = (vec![], false);
     while !cursor.is_done() {
-        if cursor.next_word().eq_ignore_ascii_case("uic") {
+        let word = cursor.next_word();
+        if ["uic", "noop"].iter().any(|start| start.eq_ignore_ascii_case(word)) {
             cursor.word();
             uic = true;
         } else if values.len() < 4 {
@@ -367,6 +370,10 @@ fn transient(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
         } else {
             break;
         }
+    }
+    if values.len() == 1 && reader.dialect.name == "ltspice" {
+        // `.tran stop`
+        values.insert(0, Expr::number(0.0));
     }
     let mut values = values.into_iter();
     let (Some(step), Some(stop)) = (values.next(), values.next()) else {

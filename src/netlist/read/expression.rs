@@ -1,5 +1,6 @@
 //! Expressions of netlists, by the shared grammar with SPICE's leaves.
 
+use super::calls;
 use super::cursor::node_name;
 use super::functions::Calls;
 use super::number;
@@ -202,14 +203,17 @@ impl Language for Spice<'_> {
                 if rule == Rule::braced || rule == Rule::quoted {
                     return parse::expression(self, parts.next()?, d);
                 }
-                let first = parts.next()?.as_str();
+                // Within a probe a colon is part of a name anyway.
+                let plain = |text: &str| text.replace(COLON, ":");
+                let first = plain(parts.next()?.as_str());
+                let first = first.as_str();
                 if rule == Rule::current {
                     Node::Leaf(Leaf::Current(self.names.intern(first)))
                 } else {
                     let grounds = self.reading.grounds;
-                    let mut node = |word| node_name(self.names, grounds, word);
+                    let mut node = |word: &str| node_name(self.names, grounds, word);
                     let first = node(first);
-                    let second = parts.next().map(|part| node(part.as_str()));
+                    let second = parts.next().map(|part| node(&plain(part.as_str())));
                     Node::Leaf(Leaf::Voltage(first, second))
                 }
             }
@@ -221,12 +225,13 @@ impl Language for Spice<'_> {
     fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = self.span(pair.as_span());
         let folded = name.to_ascii_lowercase();
-        if folded != "table" && folded != "pwl" {
+        let row = calls::find(&folded);
+        if row.is_none() && folded != "table" && folded != "pwl" {
             if let Some(leaf) = self.reading(&folded, &pair) {
                 return Some(Expr::new(Node::Leaf(leaf), span));
             }
         }
-        if folded != "table" && folded != "pwl" && self.calls.is_none() {
+        if row.is_none() && folded != "table" && folded != "pwl" && self.calls.is_none() {
             d.push(parse::unknown_function(name, span));
             return None;
         }
@@ -234,6 +239,9 @@ impl Language for Spice<'_> {
         for part in pair.into_inner().filter(|part| Self::role(part.as_rule()) == Role::Expression)
         {
             arguments.push(parse::expression(self, part, d)?);
+        }
+        if let Some(row) = row {
+            return calls::apply(row, arguments, span, d);
         }
         if folded != "table" && folded != "pwl" {
             let leaf = self.calls.as_mut()?.add(self.names, name, arguments, span);

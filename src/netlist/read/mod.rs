@@ -14,7 +14,10 @@ pub mod options;
 pub mod number;
 pub mod cursor;
 pub mod expression;
+pub mod calls;
 pub mod waveforms;
+pub mod passive;
+pub mod linked;
 pub mod devices;
 pub mod cards;
 pub mod analyses;
@@ -232,8 +235,13 @@ pub fn suffix_warning(text: &str, number: &Number, span: Span) -> Option<Diagnos
     let begins = |suffix: &str| {
         letters.get(..suffix.len()).is_some_and(|own| own.eq_ignore_ascii_case(suffix))
     };
+    // `0.5MS`, `100FA`: the unit behind it shows that a small quantity is meant.
+    let unit = letters.get(1..).unwrap_or("");
+    let small = ["s", "v", "a", "h", "f", "w", "sec", "volt", "amp"];
+    let meant = small.iter().any(|small| small.eq_ignore_ascii_case(unit));
     let (meaning, mistaken, plain) = match letters.as_bytes().first()? {
         b'M' if begins("meg") || begins("mil") => return None,
+        b'M' | b'F' if meant => return None,
         b'M' => ("milli, 1e-3", "for 1e6 write `meg`", "m"),
         b'F' => ("femto, 1e-15", "a farad needs no letter", "f"),
         b'A' if letters.len() == 1 => ("atto, 1e-18", "an ampere needs no letter", "a"),
