@@ -2,6 +2,7 @@
 
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::values::near;
+use super::vary::Variation;
 use crate::circuit::{DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::{Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
@@ -45,6 +46,16 @@ pub struct Pending<'n> {
 
 /// Expands a netlist.
 pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
+    static NONE: std::sync::LazyLock<Variation> = std::sync::LazyLock::new(Variation::default);
+    expand_with(netlist, &NONE, d)
+}
+
+/// Expands a netlist with other values in some places.
+pub fn expand_with<'n>(
+    netlist: &'n Netlist,
+    variation: &'n Variation,
+    d: &mut Vec<Diagnostic>,
+) -> Flat<'n> {
     let ground = Node { name: "0".into(), nominal: None, span: Span::NONE };
     let mut flat = Flat {
         netlist,
@@ -54,9 +65,18 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         initial: vec![],
     };
     flat.scopes.all.push(Scope::default());
-    let mut expander =
-        Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
-    let given = definitions(&mut expander.flat, TOP, &netlist.cards, d);
+    flat.scopes.temperature = variation.temperature.unwrap_or(scope::NOMINAL);
+    let ground = netlist.names.find("0");
+    let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
+    let mut given = definitions(&mut expander.flat, TOP, &netlist.cards, d);
+    for (name, expr) in &mut given {
+        *expr = variation.parameters.get(name).unwrap_or(expr);
+    }
+    for (name, model) in &mut expander.flat.scopes.get_mut(TOP).models {
+        if let Some(changed) = variation.models.get(name) {
+            model.2 = changed;
+        }
+    }
     expander.flat.scopes.get_mut(TOP).written =
         given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
@@ -73,6 +93,7 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
 
 struct Expander<'n> {
     flat: Flat<'n>,
+    variation: &'n Variation,
     ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
@@ -137,6 +158,9 @@ impl<'n> Expander<'n> {
                 | CardKind::Save { .. }
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
+                | CardKind::Analysis(_)
+                | CardKind::Step(_)
+                | CardKind::Data(_)
                     if id != TOP =>
                 {
                     let message = "this card belongs outside `.subckt`";
@@ -169,6 +193,14 @@ impl<'n> Expander<'n> {
         if self.full {
             return;
         }
+        let device = match self.variation.devices.is_empty() {
+            true => device,
+            false => {
+                let own = self.flat.netlist.names.text(device.name);
+                let path = format!("{}{own}", self.flat.scopes.get(id).path).to_lowercase();
+                self.variation.devices.get(&path).unwrap_or(device)
+            }
+        };
         let nodes: Vec<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;

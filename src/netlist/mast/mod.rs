@@ -290,7 +290,10 @@ impl<'a> Writer<'a> {
             | CardKind::Options(_)
             | CardKind::Save { .. }
             | CardKind::Transient { .. }
-            | CardKind::OperatingPoint => {}
+            | CardKind::OperatingPoint
+            | CardKind::Analysis(_)
+            | CardKind::Step(_)
+            | CardKind::Data(_) => {}
         }
     }
 

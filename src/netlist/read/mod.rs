@@ -12,6 +12,7 @@ pub mod expression;
 pub mod waveforms;
 pub mod devices;
 pub mod cards;
+pub mod analyses;
 
 use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects::{Dialect, Reading};
