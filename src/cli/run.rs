@@ -146,7 +146,7 @@ pub fn ready(
     let system = sim::compile(&stamps, d)?;
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
-    let columns = stepped.into_iter().chain((row.columns)(&analysis, &stamps));
+    let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
     let (names, units): (Vec<String>, Vec<String>) = columns
         .map(|(name, unit)| {
             let unit = if unit.is_empty() { pipeline::unit_of(&name, units) } else { unit.into() };
@@ -274,6 +274,8 @@ impl Run {
             let all: Vec<(&str, f64)> = pairs.iter().chain(more).copied().collect();
             self.vary(&all)
         };
+        // Frequencies of the command line stay in every step.
+        let own = own.filter(|_| !matches!(self.analysis, Analysis::Ac { .. }));
         let analysis = own.unwrap_or(&self.analysis);
         let job = Job { circuit, stamps, system, analysis, settings, vary: &vary };
         match analyses::row(name) {

@@ -8,6 +8,7 @@ use super::pipeline::{self, Run};
 use super::session::{Exit, Session};
 use super::watch::{self, Bar};
 use crate::bond::elaborate::Overrides;
+use crate::circuit::{Analysis, Points};
 use crate::diagnostic::Diagnostic;
 use crate::sim::{FailureKind, Interval, Progress, Settings, Statistics};
 use crate::source::{FileId, Span};
@@ -39,7 +40,7 @@ pub struct Arguments {
     /// Head columns as `name [unit]`
     #[arg(long)]
     units: bool,
-    /// Rows at exactly these times, one a line, in seconds
+    /// Rows at exactly these times, one a line, in seconds; in .ac at these frequencies in Hz
     #[arg(long, value_name = "FILE", conflicts_with = "step")]
     times: Option<String>,
     /// Which analysis of a netlist to run (op, dc, ac, tran, tf, pz, four, sens); without it the last
@@ -81,8 +82,16 @@ fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> 
     }
     let times = arguments.times.as_deref().map(|name| read_times(name, session)).transpose()?;
     let mut run = prepare(arguments, file, &overrides, session)?;
-    if let (Some(times), Some(settings)) = (times, &mut run.settings) {
-        set_times(times, settings).map_err(|error| session.fail(*error))?;
+    if let Some(times) = times {
+        match (&mut run.analysis, &mut run.settings) {
+            (Analysis::Ac { frequencies }, _) => {
+                *frequencies = Points::Rows(times.into_iter().map(|f| vec![f]).collect());
+            }
+            (_, Some(settings)) => {
+                set_times(times, settings).map_err(|error| session.fail(*error))?;
+            }
+            _ => {}
+        }
     }
     go(arguments, &mut run, session)
 }

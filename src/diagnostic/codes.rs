@@ -223,6 +223,7 @@ pub const CODES: &[Code] = &[
     row("E0807", "option makes no sense", "The value is outside what the option takes; the message says what that is."),
     row("E0808", "interrupted", "The run was interrupted. The rows written so far are good."),
     row("E0810", "steps differ in their columns", "With the values of this step the circuit has other voltages and currents than with those of the first, so that no table holds both. Name the columns with `.print`."),
+    row("E0811", "nothing linear about it", "A circuit that holds samples of instants has no linear equations, and so no phasors, poles or transfer function."),
     row("E0850", "the second route cannot go on", "The graph's own equations, integrated without a circuit, need a step smaller than rounding allows: a law has a jump or a pole at this time, or the solution ends. The message names the variable that moves most."),
     row("E0851", "the second route cannot go on after a corner", "After a corner of a source no efforts and flows were found that satisfy all laws."),
     row("E0852", "the second route takes too many steps", "The run needs more steps than it is allowed; the laws or sources vary much faster than the run is long."),

@@ -4,7 +4,7 @@ use super::explain::{Failure, FailureKind};
 use super::settings::Settings;
 use super::statistics::Statistics;
 use super::system::System;
-use super::{dc, step};
+use super::{ac, dc, step};
 use crate::circuit::stamps::Stamps;
 use crate::circuit::{Analysis, Axis, Circuit};
 use crate::diagnostic::Diagnostic;
@@ -42,7 +42,7 @@ pub struct Row {
     /// What it gives, in a line.
     pub about: &'static str,
     /// Columns; those whose unit is empty may be known by their names.
-    pub columns: fn(&Analysis, &Stamps) -> Vec<Column>,
+    pub columns: fn(&Analysis, &Circuit, &Stamps) -> Vec<Column>,
     /// Runs it and sends rows to the sink.
     pub run: fn(&Job, &mut dyn Sink) -> Result<Statistics, Failure>,
 }
@@ -53,14 +53,14 @@ pub const ANALYSES: &[Row] = &[
         name: "op",
         card: ".op",
         about: "the operating point: nothing changes any more",
-        columns: |_, stamps| outputs(stamps),
+        columns: |_, _, stamps| outputs(stamps),
         run: operating_point,
     },
     Row {
         name: "dc",
         card: ".dc src from to by [src2 …]",
         about: "operating points over values of sources, parameters or the temperature",
-        columns: |analysis, stamps| {
+        columns: |analysis, _, stamps| {
             let axes = axes(analysis);
             let first = axes.first().and_then(|axis| axis.names.first());
             // Nothing says what unit a parameter has.
@@ -69,10 +69,17 @@ pub const ANALYSES: &[Row] = &[
         run: dc::dc,
     },
     Row {
+        name: "ac",
+        card: ".ac lin|dec|oct n from to",
+        about: "phasors over frequencies, linearised at the operating point",
+        columns: |_, circuit, stamps| ac::columns(circuit, stamps),
+        run: ac::ac,
+    },
+    Row {
         name: "tran",
         card: ".tran step stop [start [hmax]] [uic]",
         about: "the course over time",
-        columns: |_, stamps| {
+        columns: |_, _, stamps| {
             [("time".to_string(), "s")].into_iter().chain(outputs(stamps)).collect()
         },
         run: |job, sink| step::transient(job.system, job.settings, sink),

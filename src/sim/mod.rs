@@ -3,6 +3,7 @@
 //! [`compile`] once; then an analysis of the table [`ANALYSES`], as often as wanted. Nothing in here knows text: options
 //! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
 
+mod ac;
 pub mod analyses;
 mod clocks;
 mod compile;
@@ -11,12 +12,14 @@ mod dc;
 mod events;
 mod explain;
 mod laws;
+mod linearise;
 mod memory;
 pub mod methods;
 mod network;
 mod newton;
 mod op;
 mod output;
+mod phasor;
 mod reduce;
 mod search;
 mod settings;
@@ -32,6 +35,7 @@ pub use crate::circuit::stamps::UnknownId;
 pub use analyses::{ANALYSES, Job};
 pub use compile::compile;
 pub use explain::{Failure, FailureKind};
+pub use linearise::Linear;
 pub use methods::{METHODS, Method};
 pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Tolerance};
 pub use statistics::{Rejected, Statistics};

@@ -18,7 +18,6 @@ use super::values::Lookup;
 use crate::circuit::{self, DeviceKind, LawOf};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
-use crate::netlist::parts::varies;
 use crate::netlist::{Expr, Passive, PassiveKind};
 
 #[rustfmt::skip]
