@@ -240,8 +240,7 @@ fn switches_of_either_hysteresis() {
     let Some(reference) = ngspice(&format!("{deck}.tran 1u 3m 0 0.1u\n.end\n")) else { return };
     let mean = |trace: &Trace, name: &str| {
         let (t, v) = (trace.time(), trace.column(name).unwrap());
-        let area: f64 =
-            (1..t.len()).map(|k| 0.5 * (v[k] + v[k - 1]) * (t[k] - t[k - 1])).sum();
+        let area: f64 = (1..t.len()).map(|k| 0.5 * (v[k] + v[k - 1]) * (t[k] - t[k - 1])).sum();
         area / 3e-3
     };
     for name in ["v(a)", "v(b)"] {

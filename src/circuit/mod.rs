@@ -445,6 +445,8 @@ pub struct Circuit {
     pub initial: Vec<(NodeId, f64)>,
     /// Where to look for an operating point: `.nodeset`.
     pub guesses: Vec<(NodeId, f64)>,
+    /// Where the search for an operating point begins: node voltages that follow from sources alone.
+    pub starts: Vec<(NodeId, f64)>,
     /// What is to be computed, in netlist order.
     pub analyses: Vec<Analysis>,
     /// Everything is computed at each of these values; the first axis runs fastest.

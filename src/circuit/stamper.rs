@@ -193,13 +193,15 @@ impl<'a> Stamper<'a> {
                 .map(|output| (output.name.clone(), self.law(&output.expr)))
                 .collect()
         };
-        let known = |values: &[(NodeId, f64)]| {
-            let of =
-                |(node, value): &(NodeId, f64)| self.node(*node).map(|unknown| (unknown, *value));
-            values.iter().filter_map(of).collect()
+        let of_nodes = |values: &[(NodeId, f64)]| {
+            let unknown = |(node, value): &(NodeId, f64)| Some((self.node(*node)?, *value));
+            values.iter().filter_map(unknown).collect()
         };
-        (self.stamps.initial, self.stamps.guesses) =
-            (known(&self.circuit.initial), known(&self.circuit.guesses));
+        (self.stamps.initial, self.stamps.guesses, self.stamps.starts) = (
+            of_nodes(&self.circuit.initial),
+            of_nodes(&self.circuit.guesses),
+            of_nodes(&self.circuit.starts),
+        );
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps
     }

@@ -194,8 +194,10 @@ pub struct Stamps {
     /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`; capacitors have
     /// taken theirs already), or held while the operating point is sought. The last of several wins.
     pub initial: Vec<(UnknownId, f64)>,
-    /// Where to look for an operating point.
+    /// Node voltages of `.nodeset`, from which the search for an operating point begins.
     pub guesses: Vec<(UnknownId, f64)>,
+    /// Node voltages that the search begins with for want of anything better.
+    pub starts: Vec<(UnknownId, f64)>,
     /// Names and places, indexed by [`DeviceId`].
     pub devices: Vec<DeviceLabel>,
 }

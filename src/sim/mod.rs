@@ -21,6 +21,7 @@ mod op;
 mod output;
 mod phasor;
 mod reduce;
+mod remarks;
 mod search;
 mod settings;
 mod statistics;

@@ -89,8 +89,8 @@ pub(crate) struct Network<'a> {
     pub anchor: Vec<f64>,
     /// Factor of all sources, while an operating point is sought; otherwise 1.
     pub drive: f64,
-    /// Pins the nodes of `.ic` to their values, while an operating point is sought.
-    pub pin_initial: bool,
+    /// Nodes that are pinned to values, while an operating point is sought: those of `.ic`, at first those of `.nodeset` too.
+    pub pins: Vec<(u32, f64)>,
     pub statistics: Statistics,
     pub memories: Memories,
     inputs: Vec<f64>,
@@ -125,7 +125,7 @@ impl<'a> Network<'a> {
             gmin: 0.0,
             anchor: vec![0.0; system.equations()],
             drive: 1.0,
-            pin_initial: false,
+            pins: vec![],
             statistics: Statistics::default(),
             memories: Memories::new(system),
             inputs: vec![0.0; system.inputs()],
@@ -295,8 +295,8 @@ impl<'a> Network<'a> {
                 *r += self.gmin * (x - anchor);
             }
         }
-        if self.pin_initial {
-            for (node, value) in &self.system.initial {
+        if !self.pins.is_empty() {
+            for (node, value) in &self.pins {
                 r[*node as usize] += PIN * (x[*node as usize] - value);
             }
         }
@@ -346,8 +346,8 @@ impl<'a> Network<'a> {
                 *sum += self.gmin * (x.abs() + anchor.abs());
             }
         }
-        if self.pin_initial {
-            for (node, value) in &self.system.initial {
+        if !self.pins.is_empty() {
+            for (node, value) in &self.pins {
                 s[*node as usize] += PIN * (x[*node as usize].abs() + value.abs());
             }
         }
@@ -463,8 +463,8 @@ impl<'a> Network<'a> {
                 values[*slot as usize] += self.gmin;
             }
         }
-        if self.pin_initial {
-            for (node, _) in &self.system.initial {
+        if !self.pins.is_empty() {
+            for (node, _) in &self.pins {
                 if let Some(slot) = self.system.node_slots.get(*node as usize) {
                     values[*slot as usize] += PIN;
                 }

@@ -5,9 +5,9 @@
 //! nothing feeds back to), those storages keep their initial values.
 
 use super::events::{Slide, settle_modes};
-use super::explain;
 use super::network::Network;
 use super::newton::{Cut, Scratch};
+use super::remarks;
 use super::search::{self, Question};
 use super::step::Stuck;
 use super::ties;
@@ -115,18 +115,22 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
-    let system = network.system;
-    for (unknown, value) in system.guesses.iter().chain(&system.initial) {
+    for (unknown, value) in &network.system.starts {
         state.x[*unknown as usize] = *value;
     }
-    network.pin_initial = true;
+    network.pins.clone_from(&network.system.initial);
     let mut held = vec![false; network.system.charges()];
     let mut tied = vec![];
     let result = settle_modes(network, state, slides, |network, state| {
-        held.copy_from_slice(&network.system.pinned);
         tied.clear();
+        let stated = network.system.pinned.iter().zip(&network.system.held);
+        for (held, (pinned, state)) in held.iter_mut().zip(stated) {
+            *held = *pinned && *state;
+        }
+        begin_at_guesses(network, &held, &targets, floors, state, scratch);
         loop {
-            let question = Question { held: &held, targets: &targets, floors, prime: true };
+            let prime = network.system.guesses.is_empty();
+            let question = Question { held: &held, targets: &targets, floors, prime };
             match search::find(network, &question, state, scratch) {
                 Err(Cut::Singular(singular)) => {
                     if !ties::hold_more(network, &singular, scratch, &mut held, &mut tied) {
@@ -147,9 +151,37 @@ pub(crate) fn operating_point(
     if result.is_ok() {
         say_ties(network, &tied);
     }
-    network.pin_initial = false;
+    network.pins.clear();
     network.forget_pivots();
     result
+}
+
+/// The guess that `.nodeset` gives: a solution with its nodes pinned to their values, which are let go afterwards.
+fn begin_at_guesses(
+    network: &mut Network,
+    held: &[bool],
+    targets: &[f64],
+    floors: &[f64],
+    state: &mut State,
+    scratch: &mut Scratch,
+) {
+    let system = network.system;
+    if system.guesses.is_empty() {
+        return;
+    }
+    let stated = |node: u32| system.initial.iter().any(|(other, _)| *other == node);
+    let pins = system.guesses.iter().filter(|(node, _)| !stated(*node));
+    network.pins.extend(pins);
+    let start = state.clone();
+    let question = Question { held, targets, floors, prime: true };
+    if search::find(network, &question, state, scratch).is_err() {
+        state.copy_from(&start);
+        for (node, value) in &system.guesses {
+            state.x[*node as usize] = *value;
+        }
+    }
+    network.pins.truncate(system.initial.len());
+    network.forget_pivots();
 }
 
 /// Warns of what the operating point left open. Bond graphs begin with what their storages are said to hold.
@@ -160,7 +192,7 @@ fn say_ties(network: &mut Network, tied: &[ties::Tie]) {
         return;
     }
     for tie in tied.iter().take(MOST) {
-        let warning = explain::left_open(system, tie.charge, &tie.open);
+        let warning = remarks::left_open(system, tie.charge, &tie.open);
         let said = &mut network.statistics.warnings;
         if !said.iter().any(|other| other.message == warning.message) {
             said.push(warning);

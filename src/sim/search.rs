@@ -114,7 +114,7 @@ pub(crate) fn find(
     }
 }
 
-/// Whether the matrix is singular beside the best point too, not just where a law happens to have no slope.
+/// Whether the matrix is singular near rest too, not just where a law happens to have no slope.
 fn stays_singular(
     network: &mut Network,
     question: &Question,
@@ -125,7 +125,7 @@ fn stays_singular(
     let mut x = best.x.clone();
     for column in singular.columns.iter().flatten().map(|column| *column as usize) {
         if let (Some(x), Some(floor)) = (x.get_mut(column), question.floors.get(column)) {
-            *x += 1e3 * floor + 0.1 * x.abs();
+            *x = 1e3 * floor;
         }
     }
     network.linearise(&x, t, false);

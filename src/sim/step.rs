@@ -120,6 +120,17 @@ const PILOT_STEPS: u64 = 1000;
 /// in it counts as a jump.
 const LAYER: f64 = 1e-9;
 
+/// The error of a step that lost its way between its ends: less than half of it is tried next.
+const LOST: f64 = 60.0;
+
+fn stored(system: &System) -> Vec<u32> {
+    let columns = system.charges.triplets().filter(|(.., value)| *value != 0.0);
+    let mut stored: Vec<u32> = columns.map(|(_, column, _)| column as u32).collect();
+    stored.sort_unstable();
+    stored.dedup();
+    stored
+}
+
 struct Run<'a> {
     network: Network<'a>,
     settings: &'a Settings,
@@ -139,6 +150,8 @@ struct Run<'a> {
     index2: bool,
     was_index2: bool,
     floors: Vec<f64>,
+    /// Unknowns that linear charges are made of.
+    stored: Vec<u32>,
     state: State,
     next: State,
     work: Work,
@@ -208,6 +221,7 @@ impl<'a> Run<'a> {
             index2: false,
             was_index2: false,
             floors: op::floors(&network),
+            stored: stored(system),
             state: State::new(0.0, n, charges),
             next: State::new(0.0, n, charges),
             work: Work::new(n, charges),
@@ -275,7 +289,11 @@ impl<'a> Run<'a> {
             self.next.t = if lands { corner } else { self.state.t + h };
             h = self.next.t - self.state.t;
             let Run { network, state, next, weights, work, .. } = self;
-            let outcome = methods::step(self.method, network, state, next, weights, work);
+            let mut outcome = methods::step(self.method, network, state, next, weights, work);
+            if matches!(outcome, Ok(error) if error <= 1.0) && self.loses_its_way() {
+                self.work.linearised = false;
+                outcome = Ok(LOST);
+            }
             let cut = match outcome {
                 Ok(error) if error <= 1.0 => match self.locate(h, &mut search) {
                     Located::Nothing => {

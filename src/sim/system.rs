@@ -208,8 +208,10 @@ pub struct System {
     pub(crate) initial_charges: Vec<Option<f64>>,
     /// Initial node voltages of `.ic`.
     pub(crate) initial: Vec<(u32, f64)>,
-    /// Unknowns and where to look for them in an operating point.
+    /// Node voltages of `.nodeset`.
     pub(crate) guesses: Vec<(u32, f64)>,
+    /// Node voltages that follow from sources alone.
+    pub(crate) starts: Vec<(u32, f64)>,
     /// Whether a charge has a non-linear part.
     pub(crate) curved: Vec<bool>,
     /// Whether a charge is a state; the others follow from these.

@@ -9,8 +9,9 @@ use crate::circuit::{Device, DeviceKind, Expr, Leaf, NodeId};
 /// Rounds of following, at most; a chain that is written backwards takes one for each of its sources.
 const ROUNDS: usize = 30;
 
-/// Adds what follows from sources, at t = 0, to the guesses that are given.
-pub fn follow(devices: &[Device], nodes: usize, guesses: &mut Vec<(NodeId, f64)>) {
+/// What follows from sources, at t = 0, and from the guesses of `.nodeset`.
+pub fn starts(devices: &[Device], nodes: usize, guesses: &[(NodeId, f64)]) -> Vec<(NodeId, f64)> {
+    let mut starts = vec![];
     let law = |device: &Device| {
         matches!(
             device.kind,
@@ -21,7 +22,7 @@ pub fn follow(devices: &[Device], nodes: usize, guesses: &mut Vec<(NodeId, f64)>
     };
     if !devices.iter().any(law) {
         // A linear circuit needs no guess.
-        return;
+        return starts;
     }
     let mut known: Vec<Option<f64>> = vec![None; nodes];
     if let Some(ground) = known.first_mut() {
@@ -53,7 +54,7 @@ pub fn follow(devices: &[Device], nodes: usize, guesses: &mut Vec<(NodeId, f64)>
             };
             if let Some(known) = known.get_mut(node.0 as usize) {
                 *known = Some(value);
-                guesses.push((node, value));
+                starts.push((node, value));
                 found = true;
             }
         }
@@ -61,6 +62,7 @@ pub fn follow(devices: &[Device], nodes: usize, guesses: &mut Vec<(NodeId, f64)>
             break;
         }
     }
+    starts
 }
 
 /// The value of a law, where all that it speaks of is known.

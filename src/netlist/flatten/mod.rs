@@ -59,8 +59,8 @@ pub fn flatten_with(
         flat.temperature = temperature;
     }
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
-    let mut guesses = experiment::guesses(&flat, diagnostics);
-    guess::follow(&devices, flat.nodes.len(), &mut guesses);
+    let guesses = experiment::guesses(&flat, diagnostics);
+    let starts = guess::starts(&devices, flat.nodes.len(), &guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
@@ -69,6 +69,7 @@ pub fn flatten_with(
         devices,
         initial,
         guesses,
+        starts,
         analyses,
         steps,
         outputs,

@@ -55,6 +55,13 @@ pub(crate) struct Stuck {
     pub x: Vec<f64>,
 }
 
+impl Stuck {
+    /// Whether the last step was cut by its error.
+    pub fn is_by_error(&self) -> bool {
+        matches!(self.cuts.last(), Some(Reason::Error(..)))
+    }
+}
+
 impl Run<'_> {
     /// Where a Rosenbrock method finds no way, since a law has a kink, no slope or an infinite one where the step begins,
     /// TR-BDF2 takes the next steps: it asks for the laws where the step ends. Says whether it can be tried.
@@ -69,6 +76,35 @@ impl Run<'_> {
         self.work.linearised = false;
         self.network.forget_pivots();
         true
+    }
+
+    /// Whether a Rosenbrock step that ends well has lost its way between: a trigger may flip and all be at rest again by the
+    /// end, and only the values there are tested. The equations are asked at the middle of the dense output, as far as
+    /// their misfit moves what storages hold.
+    pub(super) fn loses_its_way(&mut self) -> bool {
+        /// Dense output is of lower order than the step: only gross errors count.
+        const GROSS: f64 = 50.0;
+        let rosenbrock = matches!(self.method, Method::Rodas4 | Method::Rodas5p);
+        if !rosenbrock || self.stored.is_empty() || self.network.system.is_linear() {
+            return false;
+        }
+        let Run { network, state, next, weights, work, stored, .. } = self;
+        let h = next.t - state.t;
+        work.dense.unknowns(0.5, state, next, &mut work.x);
+        let middle = state.t + 0.5 * h;
+        network.evaluate(&work.x, middle);
+        network.residual(&work.x, middle, &mut work.right);
+        let [_, second, third] = &work.dense.q;
+        for (k, rate) in work.sum.iter_mut().enumerate() {
+            *rate = (next.q[k] - state.q[k] + 0.25 * (second[k] + third[k])) / h;
+        }
+        network.system.rates.add_transposed(1.0, &work.sum, &mut work.right);
+        network.solve_dynamic(&mut work.right);
+        let lost = |k: &u32| {
+            let k = *k as usize;
+            !(work.right[k].abs() <= GROSS * weights[k])
+        };
+        stored.iter().any(lost)
     }
 
     /// Comes back from a detour when it has lasted long enough.
