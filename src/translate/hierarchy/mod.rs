@@ -217,15 +217,14 @@ impl Writer<'_> {
         let inlined = (self.tree.instances.iter().zip(&self.tree.inlined))
             .filter_map(|(instance, why)| Some((instance.name.clone(), why.clone()?)));
         let inlined: Vec<(String, String)> = inlined.collect();
-        let comment = |(name, why): &(String, String)| Card {
-            kind: CardKind::Comment(format!(" {name} stands inlined: {why}")),
-            span: Span::NONE,
-            comment: None,
-        };
-        cards.splice(0..0, inlined.iter().map(comment));
+        let said = inlined.iter().flat_map(|(name, why)| {
+            [comment(&format!(" {name} stands inlined:")), comment(&format!("   {why}"))]
+        });
+        cards.splice(0..0, said);
         let (header, map) = told::told(self.naming, self.tree, &mut names, &mut cards);
         let title = self.flat.netlist.title.clone();
-        let netlist = Netlist { title, names: names.names, header, cards, ..Netlist::default() };
+        let dialect = self.flat.netlist.dialect;
+        let netlist = Netlist { title, dialect, names: names.names, header, cards };
         Hierarchy { netlist, map, inlined, subcircuits }
     }
 
@@ -426,11 +425,6 @@ impl Writer<'_> {
         let own = (0..self.graph.parameters.len())
             .filter(|at| self.naming.owners.get(&self.flat.map.parameters[*at].0) == Some(&0));
         let own = self.private(0, own.collect(), names, &mut none);
-        let comment = |text: &str| Card {
-            kind: CardKind::Comment(text.to_string()),
-            span: Span::NONE,
-            comment: None,
-        };
         if !own.is_empty() {
             cards.push(comment(" parameters, in SI units"));
         }
@@ -468,4 +462,8 @@ impl Writer<'_> {
         cards.append(&mut instances);
         cards
     }
+}
+
+fn comment(text: &str) -> Card {
+    Card { kind: CardKind::Comment(text.to_string()), span: Span::NONE, comment: None }
 }

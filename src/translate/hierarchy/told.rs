@@ -5,7 +5,6 @@ use super::naming::Naming;
 use super::tree::Tree;
 use super::words::Words;
 use crate::expr::Node;
-use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
 use crate::netlist::{Card, CardKind, Expr, Leaf, Name, write};
@@ -51,8 +50,14 @@ pub fn told(
     }
     let mut flat_names = flat.names.clone();
     for column in &mut header.columns {
-        let read =
-            expression(&column.expr, &mut flat_names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
+        let read = expression(
+            &column.expr,
+            &mut flat_names,
+            flat.dialect,
+            FileId(u32::MAX),
+            0,
+            &mut vec![],
+        );
         if let Some(expr) = read {
             let expr = paths.expr(&expr);
             column.expr = write::expression(&paths.names.names, &expr);
