@@ -79,7 +79,12 @@ fn a_hundred_random_graphs_agree_with_ngspice() {
         found += 1;
         let text = write(&model.translation.netlist);
         let name = format!("seed {seed}");
-        let trace = match stock_ngspice::run(&name, &model.translation, &text) {
+        let trace = match stock_ngspice::run(
+            &name,
+            &model.translation.netlist,
+            &model.translation.map,
+            &text,
+        ) {
             Ok(trace) => trace,
             Err(said) => {
                 wrong.push(said);

@@ -231,18 +231,15 @@ impl<'a> Builder<'a> {
         let n = self.unknowns.len();
         let mut slopes: Vec<(u32, u32)> = vec![];
         // Laws of time or of modes alone have no slope, and yet they move what stands in their equations.
-        let mut lawful = vec![];
+        let mut lawful: Vec<u32> = vec![];
         let mut curved_charges = vec![];
-        // Equations that a law moves over time.
-        let mut moved: Vec<u32> = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
                 let all = dag.inputs_of(law.node);
-                let timed = all.iter().any(|input| *input >= n as u32);
                 let inputs = all.into_iter().filter(|input| *input < n as u32);
                 match &law.target {
                     Target::Equations(into) => {
-                        moved.extend(into.iter().filter(|_| timed).map(|(row, _)| *row));
+                        lawful.extend(into.iter().map(|(row, _)| *row));
                         for input in inputs {
                             slopes.extend(into.iter().map(|(row, _)| (*row, input)));
                         }
@@ -270,7 +267,7 @@ impl<'a> Builder<'a> {
             for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
                 constant[row.0 as usize] = None;
             }
-            for row in &moved {
+            for row in &lawful {
                 constant[*row as usize] = None;
             }
             let mut charges = self.charge_entries.clone();

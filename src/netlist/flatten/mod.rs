@@ -51,8 +51,8 @@ pub fn flatten_with(
         .iter()
         .rev()
         .find(|analysis| picked.is_none_or(|picked| picked == analysis.name()));
-    let zero_is_jump = flat.zero_is_jump();
-    let times = sources::Times { zero_is_jump, ..sources::Times::of(&analyses) };
+    let mut times = sources::Times::of(&analyses);
+    times.zero_is_jump = flat.zero_is_jump();
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     if let Some(temperature) = variation.temperature {

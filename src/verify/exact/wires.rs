@@ -556,9 +556,7 @@ impl<'t, F: Modular> Wires<'t, F> {
         let Some(effort) = self.text.effort(self.graph, end) else { return false };
         let own = self.joined(&self.between(&self.text.circuit.devices[device].nodes));
         match self.form(TOP, effort) {
-            Ok(effort) => {
-                self.joined(&effort.times(-F::ONE)) == own && !own.terms.is_empty()
-            }
+            Ok(effort) => self.joined(&effort.times(-F::ONE)) == own && !own.terms.is_empty(),
             Err(_) => false,
         }
     }
@@ -683,9 +681,10 @@ fn joined(text: &Text<'_>) -> Vec<u32> {
     }
     for (k, device) in text.circuit.devices.iter().enumerate() {
         let sense = match text.element(k) {
-            Some((_, Element::VoltageSource(Waveform::Constant(value)))) => {
-                value.as_number() == Some(0.0)
-            }
+            Some((_, Element::VoltageSource(source))) => match &source.waveform {
+                Waveform::Constant(value) => value.as_number() == Some(0.0),
+                _ => false,
+            },
             _ => false,
         };
         if let (true, [a, b, ..]) = (sense, &device.nodes[..]) {
