@@ -69,6 +69,7 @@ fn run_as(model: &Translated, text: &str) -> Trace {
                 }
                 Leaf::Current(device) => column(format!("i({})", names.text(*device))).to_vec(),
                 Leaf::Time => result.time().to_vec(),
+                Leaf::Power(_) | Leaf::Part(..) => panic!("maps speak of voltages and currents"),
                 Leaf::Parameter(name) => {
                     let value = map.parameters.iter().find(|(known, _)| known == name).unwrap().1;
                     vec![value; result.rows()]

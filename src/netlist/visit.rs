@@ -25,6 +25,9 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
         CardKind::Measure(measure) => measure_mut(&mut measure.kind, visit),
+        CardKind::Analysis(analysis) => super::analysis::expressions_mut(analysis, visit),
+        CardKind::Step(sweeps) => super::analysis::sweeps_mut(sweeps, visit),
+        CardKind::Data(data) => data.values.iter_mut().for_each(visit),
         CardKind::Function(_)
         | CardKind::Global(_)
         | CardKind::Options(_)

@@ -4,6 +4,7 @@
 //! Lines stay under 80 columns: a longer card goes on behind `+`, broken at blanks. Numbers carry no suffix. A card's
 //! comment stands at the end of its line where there is room, else on a line above.
 
+use super::analysis::Print;
 use super::dialects::{Comments, Dialect, NGSPICE};
 use super::{
     Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Source, Waveform, read,
@@ -35,15 +36,25 @@ impl Form<'_> {
     }
 
     fn expression(&self, expr: &Expr) -> String {
-        print(expr, self.dialect.spelling, &mut |leaf| match leaf {
+        print(expr, self.dialect.spelling, &mut |leaf| self.leaf(leaf))
+    }
+
+    fn spelling(&self) -> super::analysis::Spelling<'_> {
+        super::analysis::Spelling { names: self.names, value: Box::new(|expr| value(*self, expr)) }
+    }
+
+    fn leaf(&self, leaf: &Leaf) -> String {
+        match leaf {
             Leaf::Parameter(name) => self.name(*name),
             Leaf::Voltage(plus, None) => format!("v({})", self.name(*plus)),
             Leaf::Voltage(plus, Some(minus)) => {
                 format!("v({},{})", self.name(*plus), self.name(*minus))
             }
             Leaf::Current(device) => format!("i({})", self.name(*device)),
+            Leaf::Power(device) => format!("p({})", self.name(*device)),
+            Leaf::Part(part, inner) => format!("{}({})", part.name(), self.leaf(inner)),
             Leaf::Time => "time".to_string(),
-        })
+        }
     }
 }
 
@@ -144,12 +155,13 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             )
             .collect()
         }
-        CardKind::Save { print, items } => {
-            let saves = if *print { form.dialect.print } else { form.dialect.save };
+        CardKind::Save { of, items } => {
+            let saves = if *of == Print::Any { form.dialect.save } else { form.dialect.print };
             if saves.is_empty() {
                 return vec![];
             }
-            let mut words: Vec<String> = saves.split(' ').map(word).collect();
+            let mut words: Vec<String> =
+                saves.replace("tran", of.word()).split(' ').map(word).collect();
             words.extend(items.iter().map(|(text, _)| text.clone()));
             words
         }
@@ -164,6 +176,9 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
         }
         CardKind::OperatingPoint => vec![word(".op")],
         CardKind::Measure(measure) => vec![word(".measure"), measure.text.clone()],
+        CardKind::Analysis(analysis) => form.spelling().analysis(analysis),
+        CardKind::Step(sweeps) => form.spelling().sweeps(".step", sweeps),
+        CardKind::Data(data) => form.spelling().data(data),
         CardKind::Comment(_)
         | CardKind::Subcircuit(_)
         | CardKind::Choice(_)

@@ -6,6 +6,7 @@ use super::values::Speaker;
 use crate::bond::graph::{Expr as GraphExpr, Leaf, ParameterId};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Function, Node, Unary};
+use crate::netlist::analysis::Print;
 use crate::netlist::header::{Column, DomainVariables, Header};
 use crate::netlist::write::expression;
 use crate::netlist::{self, Card, CardKind, Element, Expr, Name};
@@ -105,8 +106,8 @@ impl Builder<'_> {
         ));
         if !saved.is_empty() {
             // `.print` makes a run without a raw file worth having (`… | ngspice -b`), `.save` keeps a raw file small.
-            push(CardKind::Save { print: false, items: saved.clone() });
-            push(CardKind::Save { print: true, items: saved });
+            push(CardKind::Save { of: Print::Any, items: saved.clone() });
+            push(CardKind::Save { of: Print::Transient, items: saved });
         }
         if let (Some(until), Some(step)) = (experiment.until, experiment.step) {
             let number = |value: f64| Expr::number(value);

@@ -371,11 +371,12 @@ impl Check<'_> {
         let mut items: [Vec<netlist::Leaf>; 2] = [vec![], vec![]];
         let mut all = [false; 2];
         for card in &text.netlist.cards {
-            let CardKind::Save { print, items: given } = &card.kind else { continue };
-            all[usize::from(*print)] |= given.is_empty();
+            let CardKind::Save { of, items: given } = &card.kind else { continue };
+            let print = usize::from(*of != netlist::analysis::Print::Any);
+            all[print] |= given.is_empty();
             for (_, expr) in given {
                 if let crate::expr::Node::Leaf(leaf) = &*expr.node {
-                    items[usize::from(*print)].push(leaf.clone());
+                    items[print].push(leaf.clone());
                 }
             }
         }
@@ -390,7 +391,7 @@ impl Check<'_> {
                     std::iter::once(*a).chain(*b).map(|node| netlist::Leaf::Voltage(node, None)),
                 ),
                 netlist::Leaf::Current(_) => wanted.push(leaf.clone()),
-                netlist::Leaf::Parameter(_) | netlist::Leaf::Time => {}
+                _ => {}
             });
             for leaf in wanted {
                 for (print, card) in [(0, ".save"), (1, ".print")] {

@@ -2,6 +2,7 @@
 
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::values::near;
+use super::vary::Variation;
 use crate::circuit::{DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
@@ -49,6 +50,16 @@ pub struct Pending<'n> {
 
 /// Expands a netlist.
 pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
+    static NONE: std::sync::LazyLock<Variation> = std::sync::LazyLock::new(Variation::default);
+    expand_with(netlist, &NONE, d)
+}
+
+/// Expands a netlist with other values in some places.
+pub fn expand_with<'n>(
+    netlist: &'n Netlist,
+    variation: &'n Variation,
+    d: &mut Vec<Diagnostic>,
+) -> Flat<'n> {
     let ground = Node { name: "0".into(), nominal: None, span: Span::NONE };
     let mut flat = Flat {
         netlist,
@@ -60,10 +71,20 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         guesses: vec![],
     };
     flat.scopes.all.push(Scope::default());
-    let mut expander =
-        Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
+    flat.scopes.temperature = variation.temperature.unwrap_or(scope::NOMINAL);
+    let ground = netlist.names.find("0");
+    let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
-    let (live, given) = expander.choose(TOP, &netlist.cards, &[], d);
+    let varied: Vec<(Name, &Expr)> =
+        variation.parameters.iter().map(|(name, expr)| (*name, expr)).collect();
+    let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], &varied, d);
+    // The last of a name counts.
+    given.extend(varied);
+    for (name, model) in &mut expander.flat.scopes.get_mut(TOP).models {
+        if let Some(changed) = variation.models.get(name) {
+            model.2 = changed;
+        }
+    }
     expander.flat.scopes.get_mut(TOP).written =
         given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
@@ -81,6 +102,7 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
 
 struct Expander<'n> {
     flat: Flat<'n>,
+    variation: &'n Variation,
     ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
@@ -164,6 +186,7 @@ impl<'n> Expander<'n> {
         id: ScopeId,
         cards: &'n [Card],
         outer: &[(Name, &'a Expr)],
+        varied: &[(Name, &'a Expr)],
         d: &mut Vec<Diagnostic>,
     ) -> (Vec<&'n Card>, Given<'a>)
     where
@@ -180,6 +203,7 @@ impl<'n> Expander<'n> {
                     .iter()
                     .copied()
                     .chain(live.iter().flat_map(|card| parameters_of(card)))
+                    .chain(varied.iter().copied())
                     .collect();
                 self.flat.scopes.get_mut(id).parameters.clear();
                 // What is unknown as yet may stand in a branch; what stays unknown is said at the end.
@@ -223,6 +247,9 @@ impl<'n> Expander<'n> {
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
                 | CardKind::Measure(_)
+                | CardKind::Analysis(_)
+                | CardKind::Step(_)
+                | CardKind::Data(_)
                     if id != TOP =>
                 {
                     let message = "this card belongs outside `.subckt`";
@@ -259,6 +286,14 @@ impl<'n> Expander<'n> {
         if self.full {
             return;
         }
+        let device = match self.variation.devices.is_empty() {
+            true => device,
+            false => {
+                let own = self.flat.netlist.names.text(device.name);
+                let path = format!("{}{own}", self.flat.scopes.get(id).path).to_lowercase();
+                self.variation.devices.get(&path).unwrap_or(device)
+            }
+        };
         let nodes: Vec<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;
@@ -399,7 +434,7 @@ impl<'n> Expander<'n> {
             .chain(&values)
             .map(|(name, expr)| (*name, expr))
             .collect();
-        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, d);
+        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, &[], d);
         let own = live.iter().flat_map(|card| parameters_of(card));
         let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
             .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))

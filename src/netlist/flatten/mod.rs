@@ -8,17 +8,29 @@ pub mod expand;
 pub mod values;
 mod kinds;
 mod sources;
+mod analyses;
 mod experiment;
 mod measures;
 mod usage;
+pub mod vary;
 
 use super::{Netlist, header::Header};
 use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::source::Span;
+pub use vary::Variation;
 
 /// The circuit of a netlist; `None` when there were errors.
 pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<Circuit> {
+    flatten_with(netlist, &Variation::default(), diagnostics)
+}
+
+/// The circuit of a netlist with other values in some places.
+pub fn flatten_with(
+    netlist: &Netlist,
+    variation: &Variation,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Circuit> {
     let before = diagnostics.len();
     let (header, strange) = Header::read(&netlist.header);
     for line in strange {
@@ -26,12 +38,18 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         diagnostics.push(Diagnostic::warning("W0730", Span::NONE, message));
     }
     usage::check(netlist, &header, diagnostics);
-    let flat = expand::expand(netlist, diagnostics);
+    let flat = expand::expand_with(netlist, variation, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
+    let steps = analyses::steps(&flat, diagnostics);
+    let picked = variation.analysis.as_deref();
+    let run = analyses
+        .iter()
+        .rev()
+        .find(|analysis| picked.is_none_or(|picked| picked == analysis.name()));
     let times = sources::Times::of(&analyses);
     let devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
-    let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
+    let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
     let (measures, watched) = measures::resolve(&flat, diagnostics);
     let mut circuit = Circuit {
         title: netlist.title.clone(),
@@ -41,6 +59,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         guesses,
         initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
+        steps,
         outputs,
         measures,
         watched,

@@ -31,7 +31,7 @@ impl Times {
     pub fn of(analyses: &[Analysis]) -> Times {
         let transient = analyses.iter().rev().find_map(|analysis| match analysis {
             Analysis::Transient { step, stop, .. } => Some(Times { step: *step, stop: *stop }),
-            Analysis::OperatingPoint => None,
+            _ => None,
         });
         transient.unwrap_or(Times { step: 0.0, stop: 1.0 })
     }

@@ -149,6 +149,46 @@ impl<'f, 'n> Lookup<'f, 'n> {
         None
     }
 
+    /// A value of a device by its key, `r1:r`.
+    fn device_value(&self, id: ScopeId, name: Name, d: &mut Vec<Diagnostic>) -> Option<f64> {
+        let (path, key) = self.names.text(name).rsplit_once(':')?;
+        let path = format!("{}{}", self.flat.scopes.get(id).path, path.replace(':', "."));
+        let device = self.paths().devices.get(&path.to_lowercase())?;
+        let pending = self.flat.devices.get(device.0 as usize)?;
+        let mut element = pending.device.element.clone();
+        let expr = super::vary::value_of(&mut element, Some(key))?;
+        self.number(pending.scope, expr, d)
+    }
+
+    /// Whether a node of this name stands in a scope.
+    pub fn has_node(&self, id: ScopeId, name: Name) -> bool {
+        let text = self.names.text(name);
+        let scope = self.flat.scopes.get(id);
+        let path = || format!("{}{text}", scope.path).to_lowercase();
+        text == "0"
+            || scope.nodes.contains_key(&name)
+            || (text.contains('.') && self.paths().nodes.contains_key(&path()))
+    }
+
+    /// v·i of a device between its first two nodes.
+    fn power(
+        &self,
+        id: ScopeId,
+        name: Name,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Node<circuit::Leaf> {
+        let Some(device) = self.device(id, name, span, d) else { return Node::Number(f64::NAN) };
+        let nodes = self.flat.devices.get(device.0 as usize).map(|pending| &pending.nodes[..]);
+        let Some([a, b, ..]) = nodes else { return Node::Number(f64::NAN) };
+        let leaf = circuit::Expr::leaf;
+        Node::Binary(
+            crate::expr::Binary::Multiply,
+            leaf(circuit::Leaf::Voltage(*a, *b)),
+            leaf(circuit::Leaf::Current(device)),
+        )
+    }
+
     fn is_coupling(&self, device: DeviceId) -> bool {
         let pending = self.flat.devices.get(device.0 as usize);
         pending.is_some_and(|pending| matches!(pending.device.element, Element::Mutual { .. }))
@@ -174,8 +214,8 @@ impl<'f, 'n> Lookup<'f, 'n> {
                     let value = self
                         .flat
                         .scopes
-                        .parameter(id, *name)
-                        .or_else(|| scope::constant(self.names.text(*name)));
+                        .value(id, *name, self.names)
+                        .or_else(|| self.device_value(id, *name, d));
                     if value.is_none() {
                         let error = scope::unknown_parameter(
                             &self.flat.scopes,
@@ -217,6 +257,25 @@ impl<'f, 'n> Lookup<'f, 'n> {
                     None => Node::Number(f64::NAN),
                 },
                 Leaf::Time => Node::Leaf(circuit::Leaf::Time),
+                Leaf::Power(name) => self.power(id, *name, span, d),
+                Leaf::Part(part, inner) => {
+                    let probe = match &**inner {
+                        Leaf::Current(name) => {
+                            self.device(id, *name, span, d).map(circuit::Probe::Current)
+                        }
+                        Leaf::Voltage(plus, minus) => {
+                            let ground = Some(NodeId(0));
+                            let plus = self.node(id, *plus, span, d);
+                            let minus = minus.map_or(ground, |node| self.node(id, node, span, d));
+                            plus.zip(minus).map(|(a, b)| circuit::Probe::Voltage(a, b))
+                        }
+                        _ => None,
+                    };
+                    match probe {
+                        Some(probe) => Node::Leaf(circuit::Leaf::Part(*part, probe)),
+                        None => Node::Number(f64::NAN),
+                    }
+                }
             };
             circuit::Expr::new(node, span)
         });

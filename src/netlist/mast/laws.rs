@@ -63,7 +63,8 @@ impl<'a> Writer<'a> {
         let mut leaf = |leaf: &Leaf| match leaf {
             Leaf::Parameter(name) => Formula::leaf(local(this, Local::Parameter(*name))),
             Leaf::Current(name) => Formula::leaf(local(this, Local::Current(*name))),
-            Leaf::Time => Formula::leaf("time".to_string()),
+            // Powers and parts of phasors stand in outputs alone.
+            Leaf::Time | Leaf::Power(_) | Leaf::Part(..) => Formula::leaf("time".to_string()),
             Leaf::Voltage(plus, minus) => {
                 let mut of = |node: Name| match this.name(node) {
                     "0" => None,

@@ -17,6 +17,7 @@ pub mod expression;
 pub mod waveforms;
 pub mod devices;
 pub mod cards;
+pub mod analyses;
 pub mod measure;
 
 use crate::diagnostic::Diagnostic;

@@ -81,7 +81,7 @@ impl<'n> Text<'n> {
                             Leaf::Voltage(there(*plus)?, minus.map(there).transpose()?)
                         }
                         Leaf::Current(name) => Leaf::Current(there(*name)?),
-                        Leaf::Time => Leaf::Time,
+                        other => other.clone(),
                     };
                     Ok(Expr::new(crate::expr::Node::Leaf(leaf), span))
                 });

@@ -207,6 +207,9 @@ impl<'t, F: Modular> Wires<'t, F> {
                 current.cloned().ok_or_else(|| unknown(*name))
             }
             Leaf::Time => Ok(Form::number(self.bonds.draw.of(Of::Time))),
+            // They stand in outputs alone.
+            Leaf::Power(name) => Err(unknown(*name)),
+            Leaf::Part(_, inner) => self.leaf(scope, inner),
         }
     }
 
