@@ -253,24 +253,6 @@ pub enum Analysis {
         output: Output,
         source: DeviceId,
     },
-    PoleZero {
-        input: [NodeId; 2],
-        output: [NodeId; 2],
-        /// Whether a current drives the input, else a voltage.
-        current: bool,
-        poles: bool,
-        zeros: bool,
-    },
-    /// Harmonics of a transient's end.
-    Fourier {
-        frequency: f64,
-        items: Vec<Output>,
-    },
-    /// Derivatives by the values of all devices, of the operating point or of phasors.
-    Sensitivity {
-        items: Vec<Output>,
-        frequencies: Option<Points>,
-    },
 }
 
 impl Analysis {
@@ -282,9 +264,6 @@ impl Analysis {
             Analysis::Dc { .. } => "dc",
             Analysis::Ac { .. } => "ac",
             Analysis::Transfer { .. } => "tf",
-            Analysis::PoleZero { .. } => "pz",
-            Analysis::Fourier { .. } => "four",
-            Analysis::Sensitivity { .. } => "sens",
         }
     }
 }

@@ -112,8 +112,7 @@ pub fn ready(
     };
     let before = d.len();
     let point = matches!(wanted, Some(Analysis::OperatingPoint));
-    let timed =
-        matches!(wanted, None | Some(Analysis::Transient { .. } | Analysis::Fourier { .. }));
+    let timed = matches!(wanted, None | Some(Analysis::Transient { .. }));
     let mut settings = None;
     let mut still = Settings::new(1.0);
     if timed && pick.is_none_or(|name| name == "tran" || wanted.is_some()) {

@@ -192,8 +192,6 @@ pub const CODES: &[Code] = &[
     row("E0784", "nothing to sweep", "A sweep sets a parameter of the top, a device (`r1`, `r1:r`, `x1:r1:r`), a value of a model of the top (`model:key`) or the temperature (`temp`). Nothing of these has the name."),
     row("E0785", "value cannot be swept", "The device has no value of this name that is a number: behavioural sources follow laws, switches and diodes their models. Sweep a parameter that the law uses, or `model:key`."),
     row("E0786", "not an independent source", "The input of `.tf` is a V or an I."),
-    row("E0787", "no port", "A port has two different nodes."),
-    row("E0788", "no frequency", "The fundamental of `.four` is above 0, and the run is at least one of its periods long."),
     row("E0789", "too many points", "A sweep has more points than this program computes: 1e8 in one analysis, 1e6 steps. The count is worked out before anything is run."),
     row("W0701", "suffix seldom meant so", "SPICE folds case: `1M` is a milli, `1F` a femto, `1A` an atto. Write `meg` for a million, and no letter for a farad or an ampere; a small letter silences the warning."),
     row("W0702", "figures after a suffix are left out", "`4k7` is read as 4k. Write 4.7k."),

@@ -162,8 +162,6 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0784" "swept_unknown.cir"
     "E0785" "swept_law.cir"
     "E0786" "transfer_from_a_resistor.cir"
-    "E0787" "port_of_one_node.cir"
-    "E0788" "fundamental_of_0.cir"
     "E0789" "sweep_too_fine.cir"
     "W0701" "capital_m.cir"
     "W0702" "figures_after_a_suffix.cir"
