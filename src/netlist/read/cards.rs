@@ -52,7 +52,6 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("ac", Read(analyses::ac)),
     ("tf", Read(analyses::transfer)),
     ("pz", Refused(ANALYSIS)),
-    ("four", Skipped(RESULT)),
     ("sens", Refused(ANALYSIS)),
     ("step", Read(analyses::step)),
     ("data", Read(analyses::data)),
