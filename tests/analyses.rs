@@ -43,11 +43,14 @@ fn divide((a, b): (f64, f64), (c, d): (f64, f64)) -> (f64, f64) {
 
 #[test]
 fn a_resonant_circuit_in_ac() {
-    let trace = run("v1 in 0 0 ac 1\nr1 in a 10\nl1 a out 1m\nc1 out 0 1u\n.ac dec 7 100 1meg\n.print ac v(out) vdb(out) i(l1)");
+    let trace = run(
+        "v1 in 0 0 ac 1\nr1 in a 10\nl1 a out 1m\nc1 out 0 1u\n.ac dec 7 100 1meg\n.print ac v(out) vdb(out) i(l1)",
+    );
     let bottom = |f: f64| (1.0 - (TAU * f).powi(2) * 1e-9, TAU * f * 1e-5);
     assert!(misfit(&trace, "v(out)", |f| divide((1.0, 0.0), bottom(f))) < 1e-9);
     assert!(misfit(&trace, "i(l1)", |f| divide((0.0, TAU * f * 1e-6), bottom(f))) < 1e-9);
-    for ((f, db), _) in column(&trace, "frequency").iter().zip(column(&trace, "vdb(out)")).zip(0..) {
+    for ((f, db), _) in column(&trace, "frequency").iter().zip(column(&trace, "vdb(out)")).zip(0..)
+    {
         let (x, y) = bottom(*f);
         assert!((db + 20.0 * x.hypot(y).log10()).abs() < 1e-9, "{f}");
     }
@@ -63,11 +66,15 @@ fn a_capacitor_beside_a_source_carries_its_current() {
 
 #[test]
 fn coupled_inductors_and_a_line_in_ac() {
-    let trace = run("v1 a 0 0 ac 1\nl1 a 0 4m\nl2 b 0 1m\nk1 l1 l2 0.5\nr2 b 0 50\n.ac list 10 1k 100k\n.print ac v(b)");
+    let trace = run(
+        "v1 a 0 0 ac 1\nl1 a 0 4m\nl2 b 0 1m\nk1 l1 l2 0.5\nr2 b 0 50\n.ac list 10 1k 100k\n.print ac v(b)",
+    );
     // v2 = M/L1·v1 behind the leakage L2·(1 − k²).
     let exact = |f: f64| divide((0.25 * 50.0, 0.0), (50.0, TAU * f * 1e-3 * 0.75));
     assert!(misfit(&trace, "v(b)", exact) < 1e-9);
-    let trace = run("v1 in 0 0 ac 1\nr1 in a 50\nt1 a 0 b 0 z0=75 td=10n\nr2 b 0 20\n.ac lin 21 1meg 200meg\n.print ac v(b)");
+    let trace = run(
+        "v1 in 0 0 ac 1\nr1 in a 50\nt1 a 0 b 0 z0=75 td=10n\nr2 b 0 20\n.ac lin 21 1meg 200meg\n.print ac v(b)",
+    );
     // V(b) = E·Z·Zl / ((Zs·Zl + Z²)·j·sin θ + Z·(Zs + Zl)·cos θ)
     let exact = |f: f64| {
         let theta = TAU * f * 10e-9;
@@ -80,7 +87,8 @@ fn coupled_inductors_and_a_line_in_ac() {
 #[test]
 fn a_diode_is_linear_at_its_operating_point() {
     // The current source sets the current, so gd = I/(n·Vt) up to Is.
-    let trace = run("i1 0 a 1m ac 1\nd1 a 0 dm\n.model dm d(is=1e-14)\n.ac list 1k\n.print ac v(a)");
+    let trace =
+        run("i1 0 a 1m ac 1\nd1 a 0 dm\n.model dm d(is=1e-14)\n.ac list 1k\n.print ac v(a)");
     let vt = 1.380_649e-23 / 1.602_176_634e-19 * 300.15;
     let resistance = column(&trace, "v(a).re")[0];
     assert!((resistance / (vt / 1e-3) - 1.0).abs() < 1e-5, "{resistance}");
@@ -105,10 +113,14 @@ fn transfer_functions_of_dividers_and_amplifiers() {
 
 #[test]
 fn a_diode_over_its_voltage_as_ngspice_has_it() {
-    let trace = run("v1 a 0 0\nr1 a b 100\nd1 b 0 dm\n.model dm d(is=1e-14 n=1.5)\n.dc v1 -1 1 0.5\n.print dc v(b) i(v1)");
+    let trace = run(
+        "v1 a 0 0\nr1 a b 100\nd1 b 0 dm\n.model dm d(is=1e-14 n=1.5)\n.dc v1 -1 1 0.5\n.print dc v(b) i(v1)",
+    );
     assert_eq!(trace.names, ["v1", "v(b)", "i(v1)"]);
     assert_eq!(column(&trace, "v1"), [-1.0, -0.5, 0.0, 0.5, 1.0]);
-    for (v1, (vb, i)) in column(&trace, "v1").iter().zip(column(&trace, "v(b)").iter().zip(column(&trace, "i(v1)"))) {
+    for (v1, (vb, i)) in
+        column(&trace, "v1").iter().zip(column(&trace, "v(b)").iter().zip(column(&trace, "i(v1)")))
+    {
         // Kirchhoff's law, and with forward voltage the diode's own.
         assert!(((v1 - vb) / 100.0 + i).abs() < 1e-9 * i.abs() + 1e-15);
         let thermal = 1.5 * 1.380_649e-23 / 1.602_176_634e-19 * 300.15;
@@ -130,7 +142,8 @@ fn sweeps_nest_and_set_parameters_devices_and_tables() {
     }
     let trace = run(&format!("{divider}\n.dc r2 list 1k 3k"));
     assert!((column(&trace, "v(b)")[1] - 0.75).abs() < 1e-12);
-    let trace = run(&format!("{divider}\n.data points r v1\n+ 1k 4\n+ 3k 8\n.enddata\n.dc data=points"));
+    let trace =
+        run(&format!("{divider}\n.data points r v1\n+ 1k 4\n+ 3k 8\n.enddata\n.dc data=points"));
     assert!((column(&trace, "v(b)")[1] - 2.0).abs() < 1e-12, "{trace:?}");
     let trace = run(&format!("{divider}\n.dc dec v1 1 100 1"));
     assert_eq!(column(&trace, "v1"), [1.0, 10.0, 100.0]);
@@ -139,7 +152,9 @@ fn sweeps_nest_and_set_parameters_devices_and_tables() {
 #[test]
 fn steps_are_separate_runs_bit_for_bit() {
     let deck = |r: &str, step: &str| {
-        format!("v1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\nd1 b 0 dm\n.model dm d(is=1e-14)\n.tran 10u 2m\n.print tran v(b)\n{step}")
+        format!(
+            "v1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\nd1 b 0 dm\n.model dm d(is=1e-14)\n.tran 10u 2m\n.print tran v(b)\n{step}"
+        )
     };
     let stepped = run(&deck("{r}", ".param r=1\n.step param r list 100 330 1k"));
     assert_eq!(stepped.names, ["step", "time", "v(b)"]);
@@ -154,7 +169,9 @@ fn steps_are_separate_runs_bit_for_bit() {
     }
     assert_eq!(from, stepped.rows());
     // The first of two runs fastest.
-    let nested = run("v1 a 0 {x*10+y}\nr1 a 0 1\n.param x=0 y=0\n.op\n.step x 1 2 1\n.step y 1 2 1\n.print op v(a)");
+    let nested = run(
+        "v1 a 0 {x*10+y}\nr1 a 0 1\n.param x=0 y=0\n.op\n.step x 1 2 1\n.step y 1 2 1\n.print op v(a)",
+    );
     assert_eq!(column(&nested, "v(a)"), [11.0, 21.0, 12.0, 22.0]);
 }
 

@@ -10,8 +10,8 @@ pub mod stamps;
 
 use crate::expr;
 use crate::source::Span;
-pub use sweep::{Axis, Points};
 use crate::trace::measure::Measure;
+pub use sweep::{Axis, Points};
 pub use waveform::Waveform;
 
 /// A node; 0 is ground.
