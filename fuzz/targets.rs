@@ -3,7 +3,9 @@
 
 use bondspice::bond::{causality, elaborate, syntax};
 use bondspice::diagnostic::{Diagnostic, has_errors};
+use bondspice::netlist::{self, dialects::DIALECTS};
 use bondspice::source::{FileId, SourceMap};
+use bondspice::trace::{compare, formats, resample};
 
 /// Bytes of the longest text that is tried.
 pub const LONGEST: usize = 16 << 10;
@@ -97,4 +99,86 @@ pub fn shape(file: &syntax::File) -> String {
         rest = rest.split_once('}').map_or("", |(_, after)| after);
     }
     shape + rest
+}
+
+/// Reads a number of SPICE text in every dialect: what is taken is a piece of the text, the digits are those of its value.
+pub fn number(data: &[u8]) {
+    let Some(text) = std::str::from_utf8(data).ok().filter(|text| text.len() <= LONGEST) else {
+        return;
+    };
+    for reading in DIALECTS.iter().filter_map(|dialect| dialect.read) {
+        let Some(read) = netlist::read::number::number(text, reading.numbers) else {
+            continue;
+        };
+        assert!(read.letters <= read.end && text.get(..read.end).is_some(), "{text:?}: {read:?}");
+        assert!(!read.value.is_nan(), "{text:?}");
+        let digits: f64 = text[..read.letters].parse().unwrap();
+        if read.letters == read.end {
+            assert_eq!(digits.to_bits(), read.value.to_bits(), "{text:?}");
+        }
+        assert!(digits.is_sign_negative() == read.value.is_sign_negative(), "{text:?}: {read:?}");
+    }
+}
+
+/// Reads a trace of any format; what is read can be written in every format that takes it, and read back.
+pub fn trace(data: &[u8]) {
+    let Ok(trace) = formats::read("fuzzed", data) else { return };
+    let numbers: usize = trace.columns.iter().map(Vec::len).sum();
+    assert!(trace.columns.iter().all(|column| column.len() == trace.rows()));
+    let most = data.len() * 8 + (1 << 20);
+    assert!(numbers <= most, "{numbers} numbers of {} bytes", data.len());
+    let other = resample::resample(&trace, &[0.0, 1e-9, 1.0]);
+    assert_eq!(other.names, trace.names);
+    let found = compare::compare(&trace, &trace, &compare::Settings::default());
+    assert!(found.missing.is_empty());
+    for format in formats::FORMATS.iter().filter(|format| (format.refuses)(&trace.names).is_none())
+    {
+        let mut bytes = vec![];
+        (format.write)(&trace, &formats::Heading::default(), &mut bytes).unwrap();
+        if format.name == "csv" || format.name == "json" {
+            let back = formats::read("back", &bytes).unwrap();
+            assert_eq!((back.rows(), back.names.len()), (trace.rows(), trace.names.len()));
+        }
+    }
+}
+
+/// Reads a RAW file: the first bytes of one stand before the data.
+pub fn raw(data: &[u8]) {
+    if (formats::FORMATS[0].recognises)(data) {
+        return trace(data);
+    }
+    let mut bytes = b"Title: fuzzed\n".to_vec();
+    bytes.extend_from_slice(data);
+    trace(&bytes);
+}
+
+/// Reads a table: CSV, or one of blanks.
+pub fn table(data: &[u8]) {
+    let by = |name: &str| formats::by_name(name).map(|format| (format.read)(data));
+    let (csv, prn) = (by("csv"), by("prn"));
+    assert!(csv.is_some() && prn.is_some());
+    trace(data);
+}
+
+/// Reads a netlist in every dialect and flattens it. No file of the disk is read.
+pub fn deck(data: &[u8]) {
+    let text = std::str::from_utf8(data).ok().filter(|text| text.len() <= LONGEST);
+    let Some(text) = text.filter(|text| {
+        let folded = text.to_lowercase();
+        !["inc", "lib", "file"].iter().any(|word| folded.contains(word))
+    }) else {
+        return;
+    };
+    for dialect in DIALECTS.iter().filter(|dialect| dialect.read.is_some()) {
+        let mut map = SourceMap::default();
+        let file = map.add("fuzzed.cir", text);
+        let mut d = vec![];
+        let how = netlist::read::How::of(dialect);
+        let read = netlist::read::read(&mut map, file, &how, &mut d);
+        let circuit = if has_errors(&d) { None } else { netlist::flatten::flatten(&read, &mut d) };
+        if let Some(circuit) = circuit {
+            bondspice::circuit::stamps::stamp(&circuit, &mut d);
+        }
+        places_are_in(text, file, &d);
+    }
 }

@@ -1,5 +1,5 @@
-//! The texts that fuzzing found worth keeping, the shipped models and the bad files: each is read, laid out and
-//! elaborated without a crash, in less than a second and in less than a gigabyte.
+//! The texts that fuzzing found worth keeping, the shipped models and the bad files: each is read as a bond graph, laid
+//! out and elaborated, read as a deck, a number and a trace, without a crash, in less than a second and a gigabyte.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -62,6 +62,10 @@ fn replay() {
             ("parse", targets::parse as fn(&[u8])),
             ("format", targets::format),
             ("elaborate", targets::elaborate),
+            ("number", targets::number),
+            ("raw", targets::raw),
+            ("table", targets::table),
+            ("deck", targets::deck),
         ] {
             let took = time(|| target(&data));
             assert!(took < Duration::from_secs(1), "{name} {}: {took:?}", path.display());

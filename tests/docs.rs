@@ -95,6 +95,36 @@ fn examples_run() {
     assert!(run >= 20 && wrong >= 5, "{run} examples, {wrong} wrong ones");
 }
 
+/// Decks of the documentation run without an error, wrong ones give the code that they say.
+#[test]
+fn decks_run() {
+    let (mut run, mut wrong) = (0, 0);
+    let mut trouble = vec![];
+    for example in examples() {
+        let mut words = example.says.split_whitespace();
+        if words.next() != Some("cir") {
+            continue;
+        }
+        let name = example.place.clone() + ".cir";
+        let outcome = pipeline::run_text(&name, &example.text, &Overrides::default());
+        if words.next() == Some("wrong") {
+            wrong += 1;
+            let code = words.next().unwrap_or("no code");
+            let said: Vec<&str> = outcome.err().iter().flatten().map(|d| d.code).collect();
+            if !said.contains(&code) {
+                trouble.push(format!("{}: expected {code}, said {said:?}", example.place));
+            }
+            continue;
+        }
+        run += 1;
+        if let Err(said) = outcome {
+            trouble.push(format!("{}: {said:#?}", example.place));
+        }
+    }
+    assert!(trouble.is_empty(), "{}", trouble.join("\n"));
+    assert!(run >= 2 && wrong >= 1, "{run} decks, {wrong} wrong ones");
+}
+
 #[test]
 fn links_between_pages_lead_somewhere() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

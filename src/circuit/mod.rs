@@ -10,6 +10,7 @@ pub mod stamps;
 
 use crate::expr;
 use crate::source::Span;
+use crate::trace::measure::Measure;
 pub use sweep::{Axis, Points};
 pub use waveform::Waveform;
 
@@ -396,24 +397,6 @@ pub enum Analysis {
         output: Output,
         source: DeviceId,
     },
-    PoleZero {
-        input: [NodeId; 2],
-        output: [NodeId; 2],
-        /// Whether a current drives the input, else a voltage.
-        current: bool,
-        poles: bool,
-        zeros: bool,
-    },
-    /// Harmonics of a transient's end.
-    Fourier {
-        frequency: f64,
-        items: Vec<Output>,
-    },
-    /// Derivatives by the values of all devices, of the operating point or of phasors.
-    Sensitivity {
-        items: Vec<Output>,
-        frequencies: Option<Points>,
-    },
 }
 
 impl Analysis {
@@ -425,9 +408,6 @@ impl Analysis {
             Analysis::Dc { .. } => "dc",
             Analysis::Ac { .. } => "ac",
             Analysis::Transfer { .. } => "tf",
-            Analysis::PoleZero { .. } => "pz",
-            Analysis::Fourier { .. } => "four",
-            Analysis::Sensitivity { .. } => "sens",
         }
     }
 }
@@ -453,6 +433,10 @@ pub struct Circuit {
     pub steps: Vec<Axis>,
     /// Output columns; empty means every node voltage and branch current.
     pub outputs: Vec<Output>,
+    /// What is measured, over the columns of `watched`.
+    pub measures: Vec<Measure>,
+    /// Columns that are measured and not written; they come after the others.
+    pub watched: Vec<Expr>,
     /// `.options` and header options as (key, value), later ones win.
     pub options: Vec<(String, String)>,
     /// Whether `IC=` of a storage holds in an operating point, too.

@@ -193,6 +193,11 @@ impl<'a> Stamper<'a> {
                 .map(|output| (output.name.clone(), self.law(&output.expr)))
                 .collect()
         };
+        let watched = self.circuit.watched.iter().enumerate();
+        let watched: Vec<_> =
+            watched.map(|(k, expr)| (format!("measured {}", k + 1), self.law(expr))).collect();
+        self.stamps.watched = watched.len();
+        self.stamps.outputs.extend(watched);
         let of_nodes = |values: &[(NodeId, f64)]| {
             let unknown = |(node, value): &(NodeId, f64)| Some((self.node(*node)?, *value));
             values.iter().filter_map(unknown).collect()
@@ -470,5 +475,6 @@ fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
         }
     }
     circuit.outputs.iter().for_each(|output| mark(&output.expr, &mut observed));
+    circuit.watched.iter().for_each(|expr| mark(expr, &mut observed));
     (read, observed)
 }

@@ -191,6 +191,8 @@ pub struct Stamps {
     pub modes: Vec<Mode>,
     /// Output columns: name and value.
     pub outputs: Vec<(String, Law)>,
+    /// So many of them, the last ones, are measured and not written.
+    pub watched: usize,
     /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`; capacitors have
     /// taken theirs already), or held while the operating point is sought. The last of several wins.
     pub initial: Vec<(UnknownId, f64)>,

@@ -30,7 +30,7 @@ pub fn observables(
             let all = Overrides { observe: Some("all".into()), ..overrides.clone() };
             let circuit = pipeline::circuit(&mut session.map, file, &all, &mut d);
             let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d));
-            for (name, _) in stamps.iter().flat_map(|stamps| &stamps.outputs) {
+            for (name, _) in stamps.iter().flat_map(|s| &s.outputs[..s.outputs.len() - s.watched]) {
                 let unit = if name.starts_with("v(") { "V" } else { "A" };
                 table.row([name.clone(), unit.into()]);
             }

@@ -3,6 +3,7 @@
 pub mod session;
 pub mod output;
 pub mod table;
+pub mod measures;
 pub mod emit;
 pub mod flags;
 pub mod watch;

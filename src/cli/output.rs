@@ -34,7 +34,13 @@ impl NewFile {
         let begin = || -> io::Result<NewFile> {
             let path = Path::new(name);
             // A link stays one: what it leads to is replaced.
-            let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+            let target = match path.canonicalize() {
+                // Links in a circle lead to nothing.
+                Err(error) if path.is_symlink() && error.kind() != io::ErrorKind::NotFound => {
+                    return Err(error);
+                }
+                other => other.unwrap_or_else(|_| path.to_path_buf()),
+            };
             if target.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
                 let file = File::options().write(true).open(&target)?;
                 return Ok(NewFile { name: name.into(), target, temporary: None, file });

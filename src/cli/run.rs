@@ -1,5 +1,6 @@
 //! A circuit that is ready to run: which analysis, over which steps, with which columns.
 
+use super::measures::{self, Measured, Measuring};
 use super::pipeline::{self, Deck, Language, Units};
 use crate::bond::elaborate::Overrides;
 use crate::circuit::stamps::{self, Stamps};
@@ -9,6 +10,7 @@ use crate::quantity::nearest;
 use crate::sim::analyses::{self, ANALYSES, Job};
 use crate::sim::{self, Failure, FailureKind, Interval, Progress, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
+use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -33,6 +35,10 @@ pub struct Run {
     pub analysis: Analysis,
     /// Everything is run at each of these values.
     pub steps: Vec<Axis>,
+    /// What is measured in it.
+    pub measures: Vec<Measure>,
+    /// Headers of all columns, those that are only measured included.
+    all: Vec<String>,
     circuit: Circuit,
     /// Tolerances of analyses without time.
     still: Settings,
@@ -112,8 +118,7 @@ pub fn ready(
     };
     let before = d.len();
     let point = matches!(wanted, Some(Analysis::OperatingPoint));
-    let timed =
-        matches!(wanted, None | Some(Analysis::Transient { .. } | Analysis::Fourier { .. }));
+    let timed = matches!(wanted, None | Some(Analysis::Transient { .. }));
     let mut settings = None;
     let mut still = Settings::new(1.0);
     if timed && pick.is_none_or(|name| name == "tran" || wanted.is_some()) {
@@ -147,12 +152,15 @@ pub fn ready(
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
     let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
-    let (names, units): (Vec<String>, Vec<String>) = columns
+    let (mut names, mut units): (Vec<String>, Vec<String>) = columns
         .map(|(name, unit)| {
             let unit = if unit.is_empty() { pipeline::unit_of(&name, units) } else { unit.into() };
             (name, unit)
         })
         .unzip();
+    let all = names.clone();
+    names.truncate(measures::shown(&all));
+    units.truncate(names.len());
     let mut seen = std::collections::HashSet::new();
     if let Some(name) = names.iter().find(|name| !seen.insert(name.as_str())) {
         let message = format!("two columns are called `{name}`");
@@ -160,7 +168,20 @@ pub fn ready(
         d.push(Diagnostic::error("E0945", Span::NONE, message).help(help));
         return None;
     }
+    let own = analysis.name();
+    let (measures, others): (Vec<_>, Vec<_>) = circuit
+        .measures
+        .iter()
+        .cloned()
+        .partition(|measure| measure.analysis.is_empty() || measure.analysis == own);
+    if let Some(other) = others.first() {
+        let message = format!("measures of `{}` are not taken: `{own}` is run", other.analysis);
+        let warning = Diagnostic::warning("W0792", other.span, message);
+        d.push(warning.help("pick the analysis with --analysis"));
+    }
     Some(Run {
+        measures,
+        all,
         title: circuit.title.clone(),
         names,
         units,
@@ -211,6 +232,18 @@ impl Run {
     /// # Errors
     /// Why the run did not reach its end.
     pub fn go(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+        self.go_measured(sink).0
+    }
+
+    /// Runs, and sends rows to a sink; also tells what was measured.
+    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
+        let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
+        let mut measuring = Measuring::new(sink, &self.measures, &self.all, times);
+        let result = self.analyse(&mut measuring);
+        (result, measuring.finish())
+    }
+
+    fn analyse(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
         if self.steps.is_empty() {
             let settings = self.settings.as_ref().unwrap_or(&self.still);
             return self.one(&self.circuit, &self.stamps, &self.system, settings, &[], sink);

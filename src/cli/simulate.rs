@@ -3,6 +3,7 @@
 use super::emit::Stage;
 use super::flags::{DeckFlags, ModelFlags};
 use super::list;
+use super::measures;
 use super::output::{Output, write_text};
 use super::pipeline::{self, Run};
 use super::session::{Exit, Session};
@@ -43,7 +44,7 @@ pub struct Arguments {
     /// Rows at exactly these times, one a line, in seconds; in .ac at these frequencies in Hz
     #[arg(long, value_name = "FILE", conflicts_with = "step")]
     times: Option<String>,
-    /// Which analysis of a netlist to run (op, dc, ac, tran, tf, pz, four, sens); without it the last
+    /// Which analysis of a netlist to run (op, dc, ac, tf, tran); without it the last
     #[arg(long, value_name = "KIND")]
     analysis: Option<String>,
     #[command(flatten)]
@@ -54,6 +55,9 @@ pub struct Arguments {
     /// List what can be observed, with units, instead of running
     #[arg(long)]
     list: bool,
+    /// Where to write what `.measure` asks for: .csv or .json
+    #[arg(long, value_name = "FILE")]
+    measures: Option<String>,
     /// Statistics of the run on stderr
     #[arg(long, value_name = "FORM", value_parser = ["json", "text"])]
     stats: Option<String>,
@@ -124,7 +128,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     let bar = Bar::new(session.global.quiet);
     let progress = bar.clone().map(|bar| Arc::new(move |part| bar.show(part)) as Progress);
     run.watch(watch::stop_flag(), progress);
-    let result = run.go(&mut output);
+    let (result, measured) = run.go_measured(&mut output);
     if let Some(bar) = bar {
         bar.clear();
     }
@@ -132,6 +136,8 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
         Ok(statistics) => {
             session.say(statistics.warnings.clone());
             output.to.close(true, session)?;
+            let name = if run.settings.is_some() { "tran" } else { "op" };
+            measures::tell(&measured, name, arguments.measures.as_deref(), session)?;
             say_statistics(arguments, &statistics, session);
             Ok(session.exit())
         }

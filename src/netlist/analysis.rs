@@ -17,33 +17,6 @@ pub enum Analysis {
         /// The independent source.
         source: Name,
     },
-    /// `.pz in+ in− out+ out− cur|vol pol|zer|pz`.
-    PoleZero {
-        /// The nodes of the input port.
-        input: [Name; 2],
-        /// The nodes of the output port.
-        output: [Name; 2],
-        /// Whether a current drives the input, else a voltage.
-        current: bool,
-        /// Whether poles are asked for.
-        poles: bool,
-        /// Whether zeros are asked for.
-        zeros: bool,
-    },
-    /// `.four frequency items …`.
-    Fourier {
-        /// The fundamental, in Hz.
-        frequency: Expr,
-        /// What is analysed, as written and read.
-        items: Vec<(String, Expr)>,
-    },
-    /// `.sens item …`, at the operating point or over frequencies.
-    Sensitivity {
-        /// What is differentiated, as written and read.
-        items: Vec<(String, Expr)>,
-        /// The frequencies of `.sens item ac …`.
-        frequencies: Option<Points>,
-    },
 }
 
 /// A quantity and its values, or the rows of a table.
@@ -104,8 +77,6 @@ pub enum Print {
     Ac,
     OperatingPoint,
     Transfer,
-    PoleZero,
-    Sensitivity,
     /// `.save`, and `.probe`: of every analysis.
     Any,
 }
@@ -119,8 +90,6 @@ impl Print {
             Print::Ac => "ac",
             Print::OperatingPoint => "op",
             Print::Transfer => "tf",
-            Print::PoleZero => "pz",
-            Print::Sensitivity => "sens",
         }
     }
 }
@@ -146,32 +115,6 @@ impl Spelling<'_> {
             }
             Analysis::Transfer { output, source } => {
                 vec![word(".tf"), output.0.clone(), self.name(*source)]
-            }
-            Analysis::PoleZero { input, output, current, poles, zeros } => {
-                let nodes = input.iter().chain(output).map(|node| self.name(*node));
-                let wanted = match (poles, zeros) {
-                    (true, false) => "pol",
-                    (false, true) => "zer",
-                    _ => "pz",
-                };
-                let kind = if *current { "cur" } else { "vol" };
-                std::iter::once(word(".pz"))
-                    .chain(nodes)
-                    .chain([word(kind), word(wanted)])
-                    .collect()
-            }
-            Analysis::Fourier { frequency, items } => {
-                let items = items.iter().map(|(text, _)| text.clone());
-                [word(".four"), (self.value)(frequency)].into_iter().chain(items).collect()
-            }
-            Analysis::Sensitivity { items, frequencies } => {
-                let mut words = vec![word(".sens")];
-                words.extend(items.iter().map(|(text, _)| text.clone()));
-                if let Some(points) = frequencies {
-                    words.push(word("ac"));
-                    words.extend(self.frequencies(points));
-                }
-                words
             }
         }
     }
@@ -229,5 +172,34 @@ impl Spelling<'_> {
         }
         values.insert(0, kind.to_string());
         values
+    }
+}
+
+/// Calls `visit` for every expression of an analysis.
+pub(super) fn expressions_mut(analysis: &mut Analysis, visit: &mut dyn FnMut(&mut Expr)) {
+    match analysis {
+        Analysis::Dc(sweeps) => sweeps_mut(sweeps, visit),
+        Analysis::Ac(points) => points_mut(points, visit),
+        Analysis::Transfer { output, .. } => visit(&mut output.1),
+    }
+}
+
+/// Calls `visit` for every expression of sweeps.
+pub(super) fn sweeps_mut(sweeps: &mut [Sweep], visit: &mut dyn FnMut(&mut Expr)) {
+    for sweep in sweeps {
+        if let Sweep::Quantity { points, .. } = sweep {
+            points_mut(points, visit);
+        }
+    }
+}
+
+fn points_mut(points: &mut Points, visit: &mut dyn FnMut(&mut Expr)) {
+    match points {
+        Points::Linear(values)
+        | Points::Count(values)
+        | Points::Decade(values)
+        | Points::Octave(values) => values.iter_mut().for_each(visit),
+        Points::List(values) => values.iter_mut().for_each(visit),
+        Points::Table(_) => {}
     }
 }

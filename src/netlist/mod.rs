@@ -118,6 +118,8 @@ pub enum CardKind {
     Transient { step: Expr, stop: Expr, start: Option<Expr>, hmax: Option<Expr>, uic: bool },
     /// `.op`.
     OperatingPoint,
+    /// `.measure`.
+    Measure(Measure),
     /// `.dc`, `.ac`, `.tf` and the others.
     Analysis(Analysis),
     /// `.step`: everything is run at each of these values; the first of all `.step` runs fastest.
@@ -148,6 +150,22 @@ pub struct Branch {
     pub condition: Option<Expr>,
     /// Its cards.
     pub cards: Vec<Card>,
+}
+
+/// A measure over expressions of a netlist.
+pub type MeasureKind = crate::trace::measure::Kind<Expr, Expr>;
+
+/// `.measure`.
+#[derive(Clone, Debug)]
+pub struct Measure {
+    /// Its name.
+    pub name: String,
+    /// `tran`, `ac`, `dc`; empty where none is named.
+    pub analysis: String,
+    /// What it is.
+    pub kind: MeasureKind,
+    /// What stands after the keyword, as it was written.
+    pub text: String,
 }
 
 /// `.subckt` to `.ends`.

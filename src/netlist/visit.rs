@@ -1,8 +1,7 @@
 //! Every expression of a card, for what has to look at or change all of them.
 
-use super::analysis::{Analysis, Points, Sweep};
 use super::references::Reference;
-use super::{Card, CardKind, Expr};
+use super::{Card, CardKind, Expr, MeasureKind};
 
 /// Calls `visit` for each expression of a card, but not of the cards within a subcircuit or a choice.
 pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
@@ -30,8 +29,9 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             visit(stop);
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
-        CardKind::Analysis(analysis) => analysis_mut(analysis, visit),
-        CardKind::Step(sweeps) => sweeps.iter_mut().for_each(|sweep| sweep_mut(sweep, visit)),
+        CardKind::Measure(measure) => measure_mut(&mut measure.kind, visit),
+        CardKind::Analysis(analysis) => super::analysis::expressions_mut(analysis, visit),
+        CardKind::Step(sweeps) => super::analysis::sweeps_mut(sweeps, visit),
         CardKind::Data(data) => data.values.iter_mut().for_each(visit),
         CardKind::Function(_)
         | CardKind::Global(_)
@@ -41,37 +41,14 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
     }
 }
 
-fn analysis_mut(analysis: &mut Analysis, visit: &mut dyn FnMut(&mut Expr)) {
-    match analysis {
-        Analysis::Dc(sweeps) => sweeps.iter_mut().for_each(|sweep| sweep_mut(sweep, visit)),
-        Analysis::Ac(points) => points_mut(points, visit),
-        Analysis::Transfer { output, .. } => visit(&mut output.1),
-        Analysis::PoleZero { .. } => {}
-        Analysis::Fourier { frequency, items } => {
-            visit(frequency);
-            items.iter_mut().for_each(|(_, item)| visit(item));
-        }
-        Analysis::Sensitivity { items, frequencies } => {
-            items.iter_mut().for_each(|(_, item)| visit(item));
-            frequencies.iter_mut().for_each(|points| points_mut(points, visit));
-        }
-    }
-}
-
-fn sweep_mut(sweep: &mut Sweep, visit: &mut dyn FnMut(&mut Expr)) {
-    match sweep {
-        Sweep::Quantity { points, .. } => points_mut(points, visit),
-        Sweep::Table { .. } => {}
-    }
-}
-
-fn points_mut(points: &mut Points, visit: &mut dyn FnMut(&mut Expr)) {
-    match points {
-        Points::Linear(values)
-        | Points::Count(values)
-        | Points::Decade(values)
-        | Points::Octave(values) => values.iter_mut().for_each(visit),
-        Points::List(values) => values.iter_mut().for_each(visit),
-        Points::Table(_) => {}
+fn measure_mut(kind: &mut MeasureKind, visit: &mut dyn FnMut(&mut Expr)) {
+    let visit = std::cell::RefCell::new(visit);
+    let changed = |expr: &Expr| {
+        let mut expr = expr.clone();
+        visit.borrow_mut()(&mut expr);
+        Some(expr)
+    };
+    if let Some(changed) = kind.try_map(&mut &changed, &mut &changed) {
+        *kind = changed;
     }
 }

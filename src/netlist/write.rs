@@ -215,6 +215,7 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             words
         }
         CardKind::OperatingPoint => vec![word(".op")],
+        CardKind::Measure(measure) => vec![word(".measure"), measure.text.clone()],
         CardKind::Analysis(analysis) => form.spelling().analysis(analysis),
         CardKind::Step(sweeps) => form.spelling().sweeps(".step", sweeps),
         CardKind::Data(data) => form.spelling().data(data),

@@ -4,7 +4,7 @@ use super::explain::{Failure, FailureKind};
 use super::settings::Settings;
 use super::statistics::Statistics;
 use super::system::System;
-use super::{ac, dc, step};
+use super::{ac, dc, step, transfer};
 use crate::circuit::stamps::Stamps;
 use crate::circuit::{Analysis, Axis, Circuit};
 use crate::diagnostic::Diagnostic;
@@ -74,6 +74,16 @@ pub const ANALYSES: &[Row] = &[
         about: "phasors over frequencies, linearised at the operating point",
         columns: |_, circuit, stamps| ac::columns(circuit, stamps),
         run: ac::ac,
+    },
+    Row {
+        name: "tf",
+        card: ".tf v(out) source",
+        about: "gain from a source to an output, input and output resistance",
+        columns: |_, _, _| {
+            let names = [("gain", ""), ("input_resistance", "Ohm"), ("output_resistance", "Ohm")];
+            names.map(|(name, unit)| (name.to_string(), unit)).to_vec()
+        },
+        run: transfer::transfer,
     },
     Row {
         name: "tran",

@@ -394,6 +394,7 @@ impl<'a> Builder<'a> {
             time_input: time,
             nodes: stamps.nodes,
             outputs: columns.iter().map(|(name, _)| name.clone()).collect(),
+            watched: stamps.watched,
             devices: stamps.devices.clone(),
             spoken: stamps.spoken.clone(),
             charge_devices: stamps.charges.iter().map(|charge| charge.device).collect(),

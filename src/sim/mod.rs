@@ -28,6 +28,7 @@ mod statistics;
 mod step;
 mod structure;
 mod system;
+mod transfer;
 #[cfg(test)]
 mod tests;
 mod ties;

@@ -268,7 +268,9 @@ pub(crate) fn solve_frozen(
         if let Err(singular) = network.factorise_frozen(frozen.held) {
             let cut = explain(network, singular);
             // Where a slope is infinite (a root at 0) and the equations hold, there is nothing to be bettered.
-            if matches!(cut, Cut::NonFinite { .. }) && ratio <= 1e-9 {
+            let holds =
+                ratio <= 1e-9 && charge_misfit(frozen, &scratch.residual[n..]).next().is_none();
+            if holds && matches!(cut, Cut::NonFinite { .. }) {
                 return Ok(());
             }
             return Err(cut);
@@ -356,7 +358,23 @@ pub(crate) fn frozen_misfit(
     network.charges(x, q);
     frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
     relative_frozen(network, frozen, x, w, scratch);
-    worst_rows(&scratch.residual[..x.len()], &scratch.sizes[..x.len()])
+    let n = x.len();
+    let mut rows = worst_rows(&scratch.residual[..n], &scratch.sizes[..n]);
+    let charges = charge_misfit(frozen, &scratch.residual[n..]);
+    rows.extend(charges.map(|(k, left, size)| (n + k, left, size)));
+    rows
+}
+
+/// Charges that are not what they are held at, or not at rest: (charge, what is left over, its size).
+fn charge_misfit<'a>(
+    frozen: &'a Frozen,
+    residual: &'a [f64],
+) -> impl Iterator<Item = (usize, f64, f64)> + 'a {
+    residual.iter().enumerate().filter_map(|(k, left)| {
+        let size = if frozen.held[k] { frozen.targets[k].abs() } else { 0.0 };
+        let misses = left.abs() > 1e-9 * size || left.is_nan();
+        misses.then_some((k, *left, size.max(left.abs())))
+    })
 }
 
 /// Rows by how badly they are satisfied, worst first; those that are satisfied left out.

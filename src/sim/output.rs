@@ -4,7 +4,7 @@
 //! row. No step is ever cut for a row. Where the circuit is of index 2, charges say too little: there a shorter step of
 //! TR-BDF2 leads from the step's start to the row.
 
-use super::methods::{Work, trbdf2};
+use super::methods::{Dense, Work, trbdf2};
 use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
@@ -14,6 +14,13 @@ use std::io;
 
 /// How often a step is halved for straight lines at most.
 const MOST_HALVED: u32 = 8;
+
+/// Columns that are measured are straight between rows within this part of what others are.
+const MEASURED: f64 = 0.1;
+
+/// A line with one bend is at a quarter, at half or at three quarters at least this part as far from a straight one as
+/// at its bend.
+const STRAIGHT: f64 = 0.75;
 
 /// What rounding may make of a column, as a part of its magnitude.
 const ROUNDING: f64 = 1e-12;
@@ -46,6 +53,8 @@ pub(crate) struct Rows<'a> {
     /// Times closer than this are the same.
     slack: f64,
     reltol: f64,
+    /// So many columns, the last ones, are measured.
+    watched: usize,
     /// Differences that mean nothing in any column.
     least: f64,
     /// The next row of a grid or list.
@@ -54,6 +63,7 @@ pub(crate) struct Rows<'a> {
     row: Vec<f64>,
     /// The row at the left end of a step, and extremes of each column so far.
     left: Vec<f64>,
+    middle: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
     inside: Inside,
@@ -66,6 +76,9 @@ pub(crate) struct Inside {
     held: Vec<bool>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     pub factorised: Option<bool>,
+    /// Values of a shorter step, and where the dense output of the whole one waits meanwhile.
+    shorter: State,
+    dense: Dense,
 }
 
 impl<'a> Rows<'a> {
@@ -79,10 +92,12 @@ impl<'a> Rows<'a> {
             stop: settings.stop,
             slack: 1e-12 * settings.stop,
             reltol: settings.reltol,
+            watched: system.watched,
             least: 1e-2 * settings.abstol,
             next: 0,
             row: vec![0.0; columns + 1],
             left: vec![0.0; columns + 1],
+            middle: vec![0.0; columns + 1],
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
             inside: Inside::new(network),
@@ -165,9 +180,14 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Whether rows are written at every step.
+    /// Whether rows are made at every step, to be written or measured.
     pub fn follows_steps(&self) -> bool {
-        self.interval == Interval::Steps
+        self.interval == Interval::Steps || self.watched > 0
+    }
+
+    /// Whether rows are written at times of their own.
+    pub fn has_times(&self) -> bool {
+        self.interval != Interval::Steps
     }
 
     /// Writes a row at a step's end, or at one side of a jump.
@@ -192,7 +212,7 @@ impl<'a> Rows<'a> {
         self.inside.point.t = state.t;
         self.evaluate(network, time);
         if time >= self.start - self.slack {
-            self.send(network)?;
+            self.send_step(network)?;
         }
         self.widen();
         self.left.copy_from_slice(&self.row);
@@ -232,18 +252,24 @@ impl<'a> Rows<'a> {
             let span = right[0] - left[0];
             let mut off = 0.0;
             if halved < MOST_HALVED && span > self.slack {
-                // A curve that swings about its line may cross it in the middle.
-                let thetas: &[f64] = if halved < 2 { &[0.3, 0.5] } else { &[0.5] };
-                for theta in thetas {
+                // A curve that swings about its line may cross it in the middle, and a bend may lie near an end.
+                for theta in [0.5, 0.25, 0.75] {
                     let time = left[0] + theta * span;
                     self.inside.between(network, from, to, time, index2, weights, work)?;
                     self.evaluate(network, time);
                     self.widen();
-                    off = self.off_line(*theta, &left, &right).max(off);
+                    off = self.off_line(theta, &left, &right).max(off);
+                    if theta == 0.5 {
+                        self.middle.copy_from_slice(&self.row);
+                    }
+                    if off > STRAIGHT {
+                        break;
+                    }
                 }
+                self.row.copy_from_slice(&self.middle);
             }
             // What does not become straighter is rounding.
-            let straight = off <= 1.0 || (halved > 4 && off >= before);
+            let straight = off <= STRAIGHT || (halved > 4 && off >= before);
             if !straight {
                 let middle = self.row.clone();
                 pile.push((right, halved + 1, off));
@@ -253,7 +279,7 @@ impl<'a> Rows<'a> {
             left.copy_from_slice(&right);
             if !pile.is_empty() && left[0] >= self.start - self.slack {
                 self.row.copy_from_slice(&left);
-                self.send(network)?;
+                self.send_step(network)?;
             }
         }
         self.left = left;
@@ -271,12 +297,16 @@ impl<'a> Rows<'a> {
     /// How far the present row is from the line between two others, in units of what is allowed.
     fn off_line(&self, theta: f64, left: &[f64], right: &[f64]) -> f64 {
         let mut most: f64 = 0.0;
-        for c in 0..self.low.len() {
+        let measured = self.low.len() - self.watched;
+        // Columns that are written at times of their own need not be straight between steps.
+        let first = if self.has_times() { measured } else { 0 };
+        for c in first..self.low.len() {
+            let reltol = if c < measured { self.reltol } else { MEASURED * self.reltol };
             let (a, b) = (left[c + 1], right[c + 1]);
             let off = (self.row[c + 1] - (a + theta * (b - a))).abs();
             let (low, high) = (self.low[c], self.high[c]);
             let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
-            most = most.max(off / (self.reltol * (high - low)).max(rounding));
+            most = most.max(off / (reltol * (high - low)).max(rounding));
         }
         most
     }
@@ -298,6 +328,20 @@ impl<'a> Rows<'a> {
 
     fn send(&mut self, network: &mut Network) -> Result<(), Stopped> {
         network.statistics.rows += 1;
+        self.check_row(network)?;
+        Ok(self.sink.row(&self.row)?)
+    }
+
+    /// Sends the row of a step: it is written, or only measured.
+    fn send_step(&mut self, network: &mut Network) -> Result<(), Stopped> {
+        if !self.has_times() {
+            return self.send(network);
+        }
+        self.check_row(network)?;
+        Ok(self.sink.step(&self.row)?)
+    }
+
+    fn check_row(&mut self, network: &mut Network) -> Result<(), Stopped> {
         for value in &mut self.row {
             // −0 becomes 0.
             *value += 0.0;
@@ -306,7 +350,7 @@ impl<'a> Rows<'a> {
             let device = network.non_finite_law();
             return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
         }
-        Ok(self.sink.row(&self.row)?)
+        Ok(())
     }
 }
 
@@ -317,6 +361,8 @@ impl Inside {
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
             factorised: None,
+            shorter: State::new(0.0, system.equations(), system.charges()),
+            dense: Dense::new(system.equations(), system.charges()),
         }
     }
 
@@ -343,7 +389,19 @@ impl Inside {
         }
         // On a ramp laws make much of the least error of a charge: what was interpolated stands.
         let ramped = network.any_ramped();
-        self.finish_point(network, time, ramped, weights, work)
+        let belong = self.finish_point(network, time, ramped, weights, work)?;
+        if !belong && theta >= SHORT {
+            // Charges of junctions that are almost empty say little of their voltages: a step to the row says more.
+            self.shorter.copy_from(&self.point);
+            std::mem::swap(&mut self.dense, &mut work.dense);
+            let taken = trbdf2::step(network, from, &mut self.shorter, weights, work);
+            std::mem::swap(&mut self.dense, &mut work.dense);
+            if matches!(taken, Ok(error) if error <= 1.0) {
+                self.point.copy_from(&self.shorter);
+            }
+            self.factorised = None;
+        }
+        Ok(())
     }
 
     /// The same by a step of its own, so that algebraic relations between charges and rates hold.
@@ -375,7 +433,8 @@ impl Inside {
         }
     }
 
-    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`.
+    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`. Says
+    /// whether they do as far as could be.
     pub fn finish_point(
         &mut self,
         network: &mut Network,
@@ -383,21 +442,22 @@ impl Inside {
         as_is: bool,
         weights: &[f64],
         work: &mut Work,
-    ) -> Result<(), Stopped> {
+    ) -> Result<bool, Stopped> {
         self.point.t = time;
         if as_is {
-            return Ok(());
+            return Ok(true);
         }
         work.x.copy_from_slice(&self.point.x);
         work.w.copy_from_slice(&self.point.w);
         let targets = std::mem::take(&mut self.point.q);
         let corrected = self.correct(network, &targets, time, weights, work);
         self.point.q = targets;
-        if corrected.map_err(|cut| Stopped::Values(time, cut))? {
+        let belong = corrected.map_err(|cut| Stopped::Values(time, cut))?;
+        if belong {
             self.point.x.copy_from_slice(&work.x);
             self.point.w.copy_from_slice(&work.w);
         }
-        Ok(())
+        Ok(belong)
     }
 
     /// Whether the correction came to its end; an error where there are no finite values.

@@ -444,11 +444,13 @@ impl<'a> Run<'a> {
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };
         if let Some(rows) = &mut self.rows {
             let Run { network, state, next, weights, work, index2, .. } = self;
-            let outcome = if rows.follows_steps() {
-                rows.pieces(network, state, next, *index2, weights, work)
-            } else {
-                rows.inside(network, state, next, *index2, weights, work)
-            };
+            let mut outcome = Ok(());
+            if rows.follows_steps() {
+                outcome = rows.pieces(network, state, next, *index2, weights, work);
+            }
+            if outcome.is_ok() && rows.has_times() {
+                outcome = rows.inside(network, state, next, *index2, weights, work);
+            }
             outcome.map_err(|stopped| self.row_failure(stopped))?;
         }
         self.remember()?;

@@ -190,6 +190,8 @@ pub struct System {
     pub nodes: usize,
     /// Output columns.
     pub outputs: Vec<String>,
+    /// So many of them, the last ones, are measured and not written.
+    pub watched: usize,
     /// Names and places of the devices.
     pub devices: Vec<DeviceLabel>,
     /// What its parts are called in the text that it was made of.

@@ -18,7 +18,16 @@ struct In {
     names: Vec<String>,
     #[serde(default)]
     units: Vec<String>,
-    columns: Vec<Vec<Option<f64>>>,
+    columns: Vec<Vec<Number>>,
+}
+
+/// A number; `null` is none.
+struct Number(f64);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Number, D::Error> {
+        Ok(Number(Option::deserialize(from)?.unwrap_or(f64::NAN)))
+    }
 }
 
 /// Writes a whole trace. JSON has no NaN and no infinity: they become `null`.
@@ -39,7 +48,7 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
         return Err(bad("E0923", "names and columns differ in number, or columns in length"));
     }
     units.resize(names.len(), String::new());
-    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let number = |Number(value)| value;
     let columns = columns.into_iter().map(|c| c.into_iter().map(number).collect()).collect();
     Ok(Trace { names, units, columns })
 }

@@ -9,6 +9,7 @@ pub mod raw;
 pub mod json;
 pub mod vcd;
 pub mod prn;
+pub mod measure;
 
 /// Columns over a common abscissa.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,6 +66,14 @@ pub trait Sink {
     /// # Errors
     /// What writing failed with; the run stops.
     fn row(&mut self, values: &[f64]) -> std::io::Result<()>;
+
+    /// Takes the row of an accepted step, in a run whose rows stand on a grid: what is measured needs them.
+    ///
+    /// # Errors
+    /// What writing failed with; the run stops.
+    fn step(&mut self, _values: &[f64]) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 impl Sink for Trace {

@@ -115,6 +115,9 @@ fn words(line: &str) -> Vec<(String, String)> {
     found
 }
 
+/// More heads in one file are not believed.
+const MOST_TABLES: usize = 1000;
+
 /// A part of a file under one head.
 struct Table {
     trace: Trace,
@@ -162,6 +165,9 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
         }
         if let Some(names) = head.take() {
             open = place(&mut tables, names, row.len()).or(open);
+            if tables.len() > MOST_TABLES {
+                return Err(bad("E0921", format!("more than {MOST_TABLES} tables in one file")));
+            }
         }
         let at = match open {
             Some(at) => at,
@@ -227,7 +233,7 @@ impl Table {
         };
         self.last_index = index.unwrap_or(0.0);
         self.restarts += usize::from(restarts);
-        self.steps.push(1.0 + self.restarts as f64);
+        self.steps.push(self.restarts as f64);
         for (column, value) in self.trace.columns.iter_mut().zip(values) {
             column.push(*value);
         }
@@ -287,7 +293,7 @@ mod tests {
              End of Xyce(TM) Simulation\n",
         );
         assert_eq!(trace.names, ["step", "TIME", "V(1)"]);
-        assert_eq!(trace.columns[0], [1.0, 1.0, 2.0, 2.0]);
+        assert_eq!(trace.columns[0], [0.0, 0.0, 1.0, 1.0]);
         assert_eq!(trace.column("v(1)"), Some(&[1.0, 2.0, 3.0, 4.0][..]));
     }
 

@@ -70,11 +70,11 @@ mod tests {
         assert_eq!(other.columns[1], [0.0, 0.0, 0.5, 10.0, 8.0, 6.0, 6.0]);
         assert_eq!(place(&[], 1.0), None);
         trace.count_runs();
-        trace.row(&[2.0, 0.0, 7.0]).unwrap();
+        trace.row(&[1.0, 0.0, 7.0]).unwrap();
         let other = resample(&trace, &[0.5, 2.0]);
         assert_eq!(
             other.columns,
-            [[1.0, 1.0, 2.0, 2.0], [0.5, 2.0, 0.5, 2.0], [1.0, 8.0, 7.0, 7.0]]
+            [[0.0, 0.0, 1.0, 1.0], [0.5, 2.0, 0.5, 2.0], [1.0, 8.0, 7.0, 7.0]]
         );
     }
 }

@@ -40,9 +40,9 @@ impl Trace {
         found
     }
 
-    /// Puts a column `step` first that counts runs from 1; a run begins where the abscissa turns back.
+    /// Puts a column `step` first that counts runs from 0; a run begins where the abscissa turns back.
     pub fn count_runs(&mut self) {
-        let mut step = 1.0;
+        let mut step = 0.0;
         let mut direction = 0.0;
         let time = self.time();
         let mut steps = Vec::with_capacity(time.len());
@@ -83,7 +83,7 @@ mod tests {
         assert_eq!(trace.runs(), [0..7]);
         trace.count_runs();
         assert_eq!(trace.names, ["step", "time", "x"]);
-        assert_eq!(trace.columns[0], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 3.0]);
+        assert_eq!(trace.columns[0], [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0]);
         assert_eq!(trace.runs(), [0..4, 4..6, 6..7]);
         assert_eq!((trace.abscissa(), trace.time().len()), (1, 7));
     }
@@ -93,6 +93,6 @@ mod tests {
         let mut trace = Trace::new(vec!["v1".into()], vec![]);
         trace.columns = vec![vec![5.0, 4.0, 3.0, 5.0, 4.0, 3.0]];
         trace.count_runs();
-        assert_eq!(trace.columns[0], [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+        assert_eq!(trace.columns[0], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
     }
 }

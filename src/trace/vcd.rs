@@ -19,6 +19,13 @@ const SCALES: &[(i32, &str)] =
 /// More variables than this are not believed.
 const MOST_VARIABLES: usize = 1 << 20;
 
+/// A dump says what changes, a trace everything: so many values for each byte of it, beside those of [`ANYWAY`], are
+/// the most.
+const VALUES: usize = 8;
+
+/// So many values are taken of the smallest dump.
+const ANYWAY: usize = 1 << 20;
+
 /// Why a trace of these columns cannot be written.
 pub fn refuses(names: &[String]) -> Option<&'static str> {
     match names.first().map(String::as_str) {
@@ -115,6 +122,8 @@ struct Dump<'a> {
     now: Vec<f64>,
     changed: Vec<bool>,
     dirty: bool,
+    /// Values that may still be written.
+    left: usize,
     columns: Vec<Vec<f64>>,
 }
 
@@ -126,7 +135,8 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     let text = std::str::from_utf8(bytes)
         .map_err(|error| worse("E0934", "the dump is no text", error.to_string()))?;
     let mut words = text.split_ascii_whitespace();
-    let mut dump = Dump { power: -9, ..Dump::default() };
+    let left = bytes.len() * VALUES + ANYWAY;
+    let mut dump = Dump { power: -9, left, ..Dump::default() };
     while let Some(word) = words.next() {
         if let Some(keyword) = word.strip_prefix('$') {
             dump.command(keyword, &mut words)?;
@@ -134,7 +144,7 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
             dump.change(word, &mut words)?;
         }
     }
-    dump.end_row();
+    dump.end_row()?;
     let mut trace = Trace { names: dump.names, columns: dump.columns, units: vec![] };
     if trace.columns.is_empty() {
         trace.columns = vec![vec![]; trace.names.len() + 1];
@@ -214,7 +224,7 @@ impl<'a> Dump<'a> {
             let digits = !ticks.is_empty() && ticks.bytes().all(|byte| byte.is_ascii_digit());
             let time = format!("{ticks}e{}", self.power).parse().ok().filter(|_| digits);
             let time: f64 = time.ok_or_else(|| bad("E0934", format!("`{word}` is no time")))?;
-            self.end_row();
+            self.end_row()?;
             self.time = time;
             return Ok(());
         }
@@ -233,9 +243,10 @@ impl<'a> Dump<'a> {
         })?;
         // A second value at one time is the other side of a jump.
         if places.iter().any(|place| self.changed[*place] && !self.holds[*place]) {
-            self.end_row();
+            self.end_row()?;
         }
         let places = self.codes.get(code).map_or(&[][..], Vec::as_slice);
+        spend(&mut self.left, places.len())?;
         for place in places {
             self.now[*place] = value;
             self.changed[*place] = true;
@@ -245,10 +256,11 @@ impl<'a> Dump<'a> {
     }
 
     /// Writes the row of the changes so far; where a value that holds has changed, a row before it.
-    fn end_row(&mut self) {
+    fn end_row(&mut self) -> Result<(), Failed> {
         if !self.dirty {
-            return;
+            return Ok(());
         }
+        spend(&mut self.left, 2 * (self.names.len() + 1))?;
         if self.columns.is_empty() {
             self.columns = vec![vec![]; self.names.len() + 1];
         }
@@ -269,7 +281,21 @@ impl<'a> Dump<'a> {
         self.before.copy_from_slice(&self.now);
         self.changed.fill(false);
         self.dirty = false;
+        Ok(())
     }
+}
+
+/// Takes values from those that are left.
+fn spend(left: &mut usize, values: usize) -> Result<(), Failed> {
+    match left.checked_sub(values) {
+        Some(rest) => *left = rest,
+        None => {
+            let message = "the dump is too sparse: as a trace it would be many times as large";
+            let error = bad("E0934", message);
+            return Err(Box::new(error.help("dump fewer variables, or over a shorter time")));
+        }
+    }
+    Ok(())
 }
 
 /// A binary number; no number where a digit is unknown.
@@ -325,6 +351,13 @@ mod tests {
             assert_eq!(read(dump.as_bytes()).unwrap_err().code, "E0934", "{dump}");
         }
         assert_eq!(read(b"$var real 1 ! a $end \xff").unwrap_err().code, "E0934");
+    }
+
+    #[test]
+    fn sparse_dumps_do_not_unfold() {
+        let mut dump: String = (0..4000).map(|k| format!("$var wire 1 {k} w{k} $end\n")).collect();
+        (0..4000).for_each(|k| dump += &format!("#{k} 1{k}\n"));
+        assert_eq!(read(dump.as_bytes()).unwrap_err().code, "E0934");
     }
 
     #[test]

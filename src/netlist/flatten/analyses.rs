@@ -23,9 +23,6 @@ pub fn analysis(
     d: &mut Vec<Diagnostic>,
 ) -> Option<circuit::Analysis> {
     let lookup = Lookup::new(flat, &flat.netlist.names);
-    let items = |items: &[(String, Expr)], d: &mut Vec<Diagnostic>| -> Option<Vec<_>> {
-        items.iter().map(|(text, expr)| item(&lookup, text, expr, d)).collect()
-    };
     match wanted {
         Analysis::Dc(sweeps) => {
             let axes = axes(flat, sweeps, d)?;
@@ -49,42 +46,13 @@ pub fn analysis(
             }
             Some(circuit::Analysis::Transfer { output: output?, source: device })
         }
-        Analysis::PoleZero { input, output, current, poles, zeros } => {
-            let mut node = |name: &Name| lookup.node(TOP, *name, span, d);
-            let [a, b, e, f] = [&input[0], &input[1], &output[0], &output[1]].map(&mut node);
-            let (input, output) = ([a?, b?], [e?, f?]);
-            if input[0] == input[1] || output[0] == output[1] {
-                let message = "both nodes of a port are the same";
-                d.push(Diagnostic::error("E0787", span, message));
-                return None;
-            }
-            let (current, poles, zeros) = (*current, *poles, *zeros);
-            Some(circuit::Analysis::PoleZero { input, output, current, poles, zeros })
-        }
-        Analysis::Fourier { frequency, items: given } => {
-            let frequency = lookup.number(TOP, frequency, d)?;
-            if !(frequency > 0.0 && frequency.is_finite()) {
-                let message = format!("the fundamental cannot be {frequency} Hz");
-                d.push(Diagnostic::error("E0788", span, message));
-                return None;
-            }
-            Some(circuit::Analysis::Fourier { frequency, items: items(given, d)? })
-        }
-        Analysis::Sensitivity { items: given, frequencies: over } => {
-            let over = match over {
-                Some(points) => Some(frequencies(flat, points, span, d)?),
-                None => None,
-            };
-            let items = items(given, d)?;
-            Some(circuit::Analysis::Sensitivity { items, frequencies: over })
-        }
     }
 }
 
 /// The axes of all `.step` cards.
 pub fn steps(flat: &Flat, d: &mut Vec<Diagnostic>) -> Vec<Axis> {
     let mut all = vec![];
-    for card in &flat.netlist.cards {
+    for card in &flat.live {
         let CardKind::Step(sweeps) = &card.kind else { continue };
         all.extend(axes(flat, sweeps, d).unwrap_or_default());
         if limit(&all, MOST_STEPS, card.span, d).is_none() {
@@ -129,7 +97,7 @@ fn axis(flat: &Flat, sweep: &Sweep, d: &mut Vec<Diagnostic>) -> Option<Axis> {
 
 fn table<'n>(flat: &Flat<'n>, name: Name, span: Span, d: &mut Vec<Diagnostic>) -> Option<&'n Data> {
     let tables = || {
-        flat.netlist.cards.iter().filter_map(|card| match &card.kind {
+        flat.live.iter().filter_map(|card| match &card.kind {
             CardKind::Data(data) => Some(data),
             _ => None,
         })

@@ -93,10 +93,11 @@ pub fn expand_with<'n>(
     let ground = netlist.names.find("0");
     let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
-    let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], d);
-    for (name, expr) in &mut given {
-        *expr = variation.parameters.get(name).unwrap_or(expr);
-    }
+    let varied: Vec<(Name, &Expr)> =
+        variation.parameters.iter().map(|(name, expr)| (*name, expr)).collect();
+    let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], &varied, d);
+    // The last of a name counts.
+    given.extend(varied);
     for (name, model) in &mut expander.flat.scopes.get_mut(TOP).models {
         if let Some(changed) = variation.models.get(name) {
             model.2 = changed;
@@ -214,6 +215,7 @@ impl<'n> Expander<'n> {
         id: ScopeId,
         cards: &'n [Card],
         outer: &[(Name, &'a Expr)],
+        varied: &[(Name, &'a Expr)],
         d: &mut Vec<Diagnostic>,
     ) -> (Vec<&'n Card>, Given<'a>)
     where
@@ -230,6 +232,7 @@ impl<'n> Expander<'n> {
                     .iter()
                     .copied()
                     .chain(live.iter().flat_map(|card| parameters_of(card)))
+                    .chain(varied.iter().copied())
                     .collect();
                 self.flat.scopes.get_mut(id).parameters.clear();
                 // What is unknown as yet may stand in a branch; what stays unknown is said at the end.
@@ -272,6 +275,7 @@ impl<'n> Expander<'n> {
                 | CardKind::Save { .. }
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
+                | CardKind::Measure(_)
                 | CardKind::Analysis(_)
                 | CardKind::Step(_)
                 | CardKind::Data(_)
@@ -459,7 +463,7 @@ impl<'n> Expander<'n> {
             .chain(&values)
             .map(|(name, expr)| (*name, expr))
             .collect();
-        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, d);
+        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, &[], d);
         let own = live.iter().flat_map(|card| parameters_of(card));
         let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
             .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))

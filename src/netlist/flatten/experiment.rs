@@ -168,12 +168,10 @@ pub fn item(lookup: &Lookup, text: &str, expr: &Expr, d: &mut Vec<Diagnostic>) -
 fn print_of(analysis: &Analysis) -> Print {
     match analysis {
         Analysis::OperatingPoint => Print::OperatingPoint,
-        Analysis::Transient { .. } | Analysis::Fourier { .. } => Print::Transient,
+        Analysis::Transient { .. } => Print::Transient,
         Analysis::Dc { .. } => Print::Dc,
         Analysis::Ac { .. } => Print::Ac,
         Analysis::Transfer { .. } => Print::Transfer,
-        Analysis::PoleZero { .. } => Print::PoleZero,
-        Analysis::Sensitivity { .. } => Print::Sensitivity,
     }
 }
 

@@ -16,6 +16,7 @@ mod transfer;
 mod analyses;
 mod experiment;
 mod guess;
+mod measures;
 mod usage;
 pub mod vary;
 
@@ -62,6 +63,7 @@ pub fn flatten_with(
     let guesses = experiment::guesses(&flat, diagnostics);
     let starts = guess::starts(&devices, flat.nodes.len(), &guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
+    let (measures, watched) = measures::resolve(&flat, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
         title: netlist.title.clone(),
@@ -73,6 +75,8 @@ pub fn flatten_with(
         analyses,
         steps,
         outputs,
+        measures,
+        watched,
         options,
         grid: header.grid,
         initial_holds: netlist.dialect.reading().initial_holds,

@@ -165,6 +165,8 @@ pub fn parameters(
     for (name, _) in given {
         // A stack of its own, since chains may be long.
         let mut chain = vec![*name];
+        let mut open: Table<usize> = Table::default();
+        open.insert(*name, 0);
         while let Some(top) = chain.last().copied() {
             let known = |name: &Name| {
                 let own = scopes.get(id);
@@ -174,6 +176,7 @@ pub fn parameters(
             };
             let Some(expr) = wanted.get(&top).filter(|_| !known(&top)) else {
                 chain.pop();
+                open.remove(&top);
                 continue;
             };
             let mut next = None;
@@ -187,7 +190,7 @@ pub fn parameters(
                 }
             });
             match next {
-                Some((used, span)) => match chain.iter().position(|name| *name == used) {
+                Some((used, span)) => match open.get(&used).copied() {
                     Some(start) => {
                         let round: Vec<_> = chain[start..]
                             .iter()
@@ -202,7 +205,10 @@ pub fn parameters(
                             failed.insert(*name, ());
                         }
                     }
-                    None => chain.push(used),
+                    None => {
+                        open.insert(used, chain.len());
+                        chain.push(used);
+                    }
                 },
                 None if !failed_within(expr, &failed) && varies(scopes, id, expr) => {
                     scopes.get_mut(id).varying.insert(top, ());
@@ -223,6 +229,7 @@ pub fn parameters(
                         }
                     }
                     chain.pop();
+                    open.remove(&top);
                 }
             }
         }

@@ -4,7 +4,7 @@ use super::values::NEAR;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
 use crate::netlist::parts::every_leaf;
-use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist};
+use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist, read};
 use crate::quantity::nearest;
 use crate::source::Span;
 
@@ -126,6 +126,9 @@ impl Usage {
                     nodes.iter().chain(nodes).for_each(|node| self.count(*node));
                 }
                 CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| self.expr(expr)),
+                CardKind::Measure(measure) => {
+                    read::measure::expressions(&measure.kind, &mut |expr| self.expr(expr));
+                }
                 _ => {}
             }
         }

@@ -9,7 +9,7 @@
 use super::{Cursor, Reader};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::analysis::{Analysis, Data, Points, Print, Sweep};
-use crate::netlist::{CardKind, Expr, Name, Part};
+use crate::netlist::{CardKind, Expr, Leaf, Name, Part};
 
 /// `.dc`.
 pub fn dc(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
@@ -228,79 +228,6 @@ fn output(reader: &mut Reader, cursor: &mut Cursor) -> Option<(String, Expr)> {
     super::cards::item(reader, cursor, from, to)
 }
 
-/// `.pz in+ in− out+ out− cur|vol pol|zer|pz`.
-pub fn pole_zero(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    let mut nodes = vec![];
-    for what in ["input", "input", "output", "output"] {
-        let (word, _) = cursor.word();
-        if word.is_empty() {
-            let what =
-                format!("a node of the {what} of `.pz in+ in- out+ out- cur|vol pol|zer|pz`");
-            reader.missing(cursor, &what);
-            return None;
-        }
-        nodes.push(reader.node_name(word));
-    }
-    let mut choice = |of: &[&str]| {
-        let (word, from) = cursor.word();
-        let found = of.iter().position(|known| word.eq_ignore_ascii_case(known));
-        if found.is_none() {
-            let span = if word.is_empty() {
-                cursor.here(reader)
-            } else {
-                cursor.span(reader, from, from + word.len())
-            };
-            let message = format!("one of `{}` is missing", of.join("`, `"));
-            reader.diagnostics.push(Diagnostic::error("E0703", span, message));
-        }
-        found
-    };
-    let current = choice(&["vol", "cur"])? == 1;
-    let wanted = choice(&["pol", "zer", "pz"])?;
-    let [a, b, c, d] = nodes[..] else { return None };
-    Some(CardKind::Analysis(Analysis::PoleZero {
-        input: [a, b],
-        output: [c, d],
-        current,
-        poles: wanted != 1,
-        zeros: wanted != 0,
-    }))
-}
-
-/// `.four frequency item …`.
-pub fn fourier(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    let frequency = reader.value(cursor, "the fundamental frequency")?;
-    let mut items = vec![];
-    while !cursor.is_done() {
-        items.push(output(reader, cursor)?);
-    }
-    if items.is_empty() {
-        reader.missing(cursor, "what is analysed, `v(node)`");
-        return None;
-    }
-    Some(CardKind::Analysis(Analysis::Fourier { frequency, items }))
-}
-
-/// `.sens item … [ac lin|dec|oct n from to]`.
-pub fn sensitivity(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    let (mut items, mut over) = (vec![], None);
-    while !cursor.is_done() {
-        let mut ahead = *cursor;
-        let word = ahead.word().0.to_ascii_lowercase();
-        if (word == "ac" || word == "dc") && ahead.peek() != Some(b'(') {
-            *cursor = ahead;
-            over = if word == "ac" { Some(frequencies(reader, cursor)?) } else { None };
-            break;
-        }
-        items.push(output(reader, cursor)?);
-    }
-    if items.is_empty() {
-        reader.missing(cursor, "what is differentiated, `v(node)`");
-        return None;
-    }
-    Some(CardKind::Analysis(Analysis::Sensitivity { items, frequencies: over }))
-}
-
 /// `.data name column … value …`.
 pub fn data(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     let (word, from) = cursor.word();
@@ -341,8 +268,6 @@ pub fn print(word: &str) -> Option<Print> {
         "ac" => Print::Ac,
         "op" => Print::OperatingPoint,
         "tf" => Print::Transfer,
-        "pz" => Print::PoleZero,
-        "sens" => Print::Sensitivity,
         _ => return None,
     })
 }
@@ -353,7 +278,6 @@ pub fn part(name: &str) -> Option<(char, &str)> {
     let kind = letters.next()?.to_ascii_lowercase();
     let rest = letters.as_str();
     let known = ["r", "i", "m", "p", "db"].iter().any(|part| rest.eq_ignore_ascii_case(part));
-    // `im(x)` is the imaginary part of x as well as the magnitude of a current; a device decides in [`reading`].
     (matches!(kind, 'v' | 'i') && known).then_some((kind, rest))
 }
 
@@ -367,4 +291,45 @@ pub fn phasor_part(text: &str) -> Option<Part> {
         "db" => Part::Decibel,
         _ => return None,
     })
+}
+
+/// What outputs read beside v() and i(): parts of phasors (`vdb(out)`, `im(v1)`, `db(v(out))`), powers (`p(r1)`), and
+/// Xyce's `n(node)`.
+pub fn reading(reader: &mut Reader, text: &str) -> Option<Leaf> {
+    let (name, rest) = text.split_once('(')?;
+    let inner = rest.strip_suffix(')')?;
+    let plain =
+        |text: &str| !text.is_empty() && !text.contains(['(', ')', '{', '*', '/', ' ', '\'']);
+    let words: Vec<&str> = inner.split(',').map(str::trim).collect();
+    let voltage = |reader: &mut Reader, words: &[&str]| match words {
+        [a] if plain(a) => Some(Leaf::Voltage(reader.node_name(a), None)),
+        [a, b] if plain(a) && plain(b) => {
+            let minus = reader.node_name(b);
+            Some(Leaf::Voltage(reader.node_name(a), Some(minus)))
+        }
+        _ => None,
+    };
+    if let Some((kind, part)) = part(name) {
+        let leaf = match (kind, &words[..]) {
+            ('v', words) => voltage(reader, words)?,
+            (_, [device]) if plain(device) => Leaf::Current(reader.names.intern(device)),
+            _ => return None,
+        };
+        return Some(Leaf::Part(phasor_part(part)?, Box::new(leaf)));
+    }
+    match (name.to_ascii_lowercase().as_str(), &words[..]) {
+        ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(reader.names.intern(device))),
+        ("n", [_]) => voltage(reader, &words),
+        _ => {
+            let part = phasor_part(name).filter(|_| name.len() > 1)?;
+            let (of, rest) = inner.split_once('(')?;
+            let words: Vec<&str> = rest.strip_suffix(')')?.split(',').map(str::trim).collect();
+            let leaf = match (of.trim().to_ascii_lowercase().as_str(), &words[..]) {
+                ("v", words) => voltage(reader, words)?,
+                ("i", [device]) if plain(device) => Leaf::Current(reader.names.intern(device)),
+                _ => return None,
+            };
+            Some(Leaf::Part(part, Box::new(leaf)))
+        }
+    }
 }

@@ -51,16 +51,16 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("dc", Read(analyses::dc)),
     ("ac", Read(analyses::ac)),
     ("tf", Read(analyses::transfer)),
-    ("pz", Read(analyses::pole_zero)),
-    ("four", Read(analyses::fourier)),
-    ("sens", Read(analyses::sensitivity)),
+    ("pz", Refused(ANALYSIS)),
+    ("sens", Refused(ANALYSIS)),
     ("step", Read(analyses::step)),
     ("data", Read(analyses::data)),
     ("enddata", Read(|_, _| None)),
     ("plot", Skipped(RESULT)),
     ("probe", Skipped(RESULT)),
-    ("meas", Skipped(RESULT)),
-    ("measure", Skipped(RESULT)),
+    ("four", Skipped(RESULT)),
+    ("meas", Read(super::measure::measure)),
+    ("measure", Read(super::measure::measure)),
     ("width", Skipped("it lays out another simulator's print")),
     ("noise", Refused(ANALYSIS)),
     ("disto", Refused(ANALYSIS)),
@@ -460,6 +460,10 @@ pub fn item(
         // A node, or a parameter: that is known when all nodes are.
         let leaf = Leaf::Parameter(reader.names.intern(text));
         return Some((text.to_string(), Expr::new(Node::Leaf(leaf), span)));
+    }
+    if let Some(leaf) = analyses::reading(reader, text) {
+        let name = text.split_whitespace().collect::<String>();
+        return Some((name, Expr::new(Node::Leaf(leaf), span)));
     }
     // ngspice: par('expression').
     let quoted = text.get(..5).filter(|head| head.eq_ignore_ascii_case("par('"));

@@ -271,49 +271,6 @@ impl Language for Spice<'_> {
     }
 }
 
-impl Spice<'_> {
-    /// What outputs read beside v() and i(): parts of phasors (`vdb(out)`, `im(v1)`, `db(v(out))`), powers (`p(r1)`), and
-    /// Xyce's `n(node)`.
-    fn reading(&mut self, name: &str, pair: &Pair<'_, Rule>) -> Option<Leaf> {
-        let arguments: Vec<Pair<'_, Rule>> = pair
-            .clone()
-            .into_inner()
-            .filter(|part| Self::role(part.as_rule()) == Role::Expression)
-            .collect();
-        let texts: Vec<&str> = arguments.iter().map(|part| part.as_str().trim()).collect();
-        let grounds = self.reading.grounds;
-        let mut node = |word: &str| node_name(self.names, grounds, word);
-        let plain = |text: &str| {
-            !text.is_empty() && !text.contains(['(', ')', '{', '}', '*', '/', ' ', '\''])
-        };
-        if let Some((kind, part)) = super::analyses::part(name) {
-            let part = super::analyses::phasor_part(part)?;
-            let leaf = match (kind, &texts[..]) {
-                ('v', [a]) if plain(a) => Leaf::Voltage(node(a), None),
-                ('v', [a, b]) if plain(a) && plain(b) => Leaf::Voltage(node(a), Some(node(b))),
-                ('i', [device]) if plain(device) => Leaf::Current(self.names.intern(device)),
-                _ => return None,
-            };
-            return Some(Leaf::Part(part, Box::new(leaf)));
-        }
-        match (name, &texts[..]) {
-            ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(self.names.intern(device))),
-            ("n", [word]) if plain(word) => Some(Leaf::Voltage(node(word), None)),
-            (_, [_]) => {
-                let part = super::analyses::phasor_part(name)?;
-                let leaf = parse::expression(self, arguments.first()?.clone(), &mut vec![])?;
-                match *leaf.node {
-                    Node::Leaf(leaf @ (Leaf::Voltage(..) | Leaf::Current(_))) => {
-                        Some(Leaf::Part(part, Box::new(leaf)))
-                    }
-                    _ => None,
-                }
-            }
-            _ => None,
-        }
-    }
-}
-
 /// A table of x0, y0, x1, y1, … with rising x.
 pub fn table(points: &[f64]) -> Option<Table> {
     let rising = points.chunks(2).zip(points.chunks(2).skip(1)).all(|(a, b)| a[0] < b[0]);

@@ -21,6 +21,7 @@ pub mod linked;
 pub mod devices;
 pub mod cards;
 pub mod analyses;
+pub mod measure;
 
 use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects::{Dialect, Reading};

@@ -98,7 +98,7 @@ pub(crate) struct Dense {
 }
 
 impl Dense {
-    fn new(n: usize, charges: usize) -> Dense {
+    pub fn new(n: usize, charges: usize) -> Dense {
         Dense {
             x: std::array::from_fn(|_| vec![0.0; n]),
             q: std::array::from_fn(|_| vec![0.0; charges]),

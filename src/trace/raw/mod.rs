@@ -151,7 +151,7 @@ mod tests {
         let names = ["step", "frequency", "v(a).re", "v(a).im", "gain"];
         let mut trace = Trace::new(names.map(String::from).to_vec(), vec![]);
         for row in
-            [[1.0, 10.0, 1.0, -2.0, 3.0], [1.0, 20.0, 4.0, 5.0, 6.0], [2.0, 10.0, 7.0, 8.0, 9.0]]
+            [[0.0, 10.0, 1.0, -2.0, 3.0], [0.0, 20.0, 4.0, 5.0, 6.0], [1.0, 10.0, 7.0, 8.0, 9.0]]
         {
             trace.row(&row).unwrap();
         }
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(trace.columns, [[0.0, 1e-3, 2e-3], [1.5, 2.5, -0.25]]);
         let trace = read(&ltspice("real forward stepped", 5, &flat)).unwrap();
         assert_eq!(trace.names, ["step", "time", "V(out)"]);
-        assert_eq!(trace.columns[0], [1.0, 1.0, 1.0, 2.0, 2.0]);
+        assert_eq!(trace.columns[0], [0.0, 0.0, 0.0, 1.0, 1.0]);
         assert_eq!(trace.columns[2], [1.5, 2.5, -0.25, 9.0, 8.0]);
         let times: Vec<u8> = rows[..3].iter().flat_map(|(t, _)| t.to_le_bytes()).collect();
         let values: Vec<u8> = rows[..3].iter().flat_map(|(_, v)| v.to_le_bytes()).collect();
