@@ -74,6 +74,7 @@ impl Builder<'_> {
 
     /// Adds options, saved variables and the transient, and returns the header.
     pub(super) fn experiment_cards(&mut self, diagnostics: &mut Vec<Diagnostic>) -> Header {
+        self.mark(Mark::default());
         let experiment = &self.graph.experiment;
         let mut columns = Vec::new();
         let mut saved = Vec::new();
