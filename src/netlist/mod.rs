@@ -2,6 +2,7 @@
 
 pub mod names;
 pub mod visit;
+pub mod references;
 pub mod header;
 pub mod read;
 pub mod write;

@@ -34,16 +34,36 @@ impl Form<'_> {
         self.names.text(name).to_string()
     }
 
+    /// A name that may lead into subcircuits.
+    fn inside(&self, name: Name) -> String {
+        self.names.text(name).replace('.', self.dialect.separator)
+    }
+
     fn expression(&self, expr: &Expr) -> String {
         print(expr, self.dialect.spelling, &mut |leaf| match leaf {
             Leaf::Parameter(name) => self.name(*name),
-            Leaf::Voltage(plus, None) => format!("v({})", self.name(*plus)),
+            Leaf::Voltage(plus, None) => format!("v({})", self.inside(*plus)),
             Leaf::Voltage(plus, Some(minus)) => {
-                format!("v({},{})", self.name(*plus), self.name(*minus))
+                format!("v({},{})", self.inside(*plus), self.inside(*minus))
             }
-            Leaf::Current(device) => format!("i({})", self.name(*device)),
+            Leaf::Current(device) => match self.dialect.lettered {
+                true => format!("i({})", lettered(self.names.text(*device))),
+                false => format!("i({})", self.inside(*device)),
+            },
             Leaf::Time => "time".to_string(),
         })
+    }
+}
+
+/// A device in a subcircuit as ngspice calls it: `h.X_motor.H_emf`, its letter before the path.
+fn lettered(name: &str) -> String {
+    let Some((path, own)) = name.rsplit_once('.') else { return name.to_string() };
+    let letter = own.get(..1).unwrap_or("").to_lowercase();
+    let first = path.split('.').next().unwrap_or("");
+    // Names that were read stand so already.
+    match first.eq_ignore_ascii_case(&letter) {
+        true => name.to_string(),
+        false => format!("{letter}.{name}"),
     }
 }
 
@@ -78,7 +98,7 @@ fn cards(text: &mut String, form: Form, cards: &[Card]) {
             CardKind::Subcircuit(subcircuit) => {
                 let mut words = vec![".subckt".to_string(), form.name(subcircuit.name)];
                 words.extend(subcircuit.ports.iter().map(|port| form.name(*port)));
-                words.extend(assignments(form, &subcircuit.parameters));
+                words.extend(given(form, &subcircuit.parameters));
                 line(text, &words, card.comment.as_deref(), form.dialect.comments);
                 self::cards(text, form, &subcircuit.cards);
                 line(
@@ -150,7 +170,10 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
                 return vec![];
             }
             let mut words: Vec<String> = saves.split(' ').map(word).collect();
-            words.extend(items.iter().map(|(text, _)| text.clone()));
+            words.extend(items.iter().map(|(text, expr)| match text.contains('.') {
+                true => form.expression(expr),
+                false => text.clone(),
+            }));
             words
         }
         CardKind::Transient { step, stop, start, hmax, uic } => {
@@ -232,7 +255,7 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
         }
         Element::Instance { subcircuit, parameters } => {
             words.push(name(subcircuit));
-            words.extend(assignments(form, parameters));
+            words.extend(given(form, parameters));
         }
     }
     words
@@ -264,6 +287,12 @@ fn source_words(form: Form, source: &Source) -> Vec<String> {
         words.extend(arguments);
     }
     words
+}
+
+/// Parameters of a subcircuit.
+fn given(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {
+    let begin = (!parameters.is_empty()).then(|| "PARAMS:".to_string());
+    begin.into_iter().chain(assignments(form, parameters)).collect()
 }
 
 fn assignments(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {

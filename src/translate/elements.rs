@@ -4,7 +4,7 @@ use super::flows::{Carrier, Reader, own_device};
 use super::forms::{Coupling, Form, Integrator, SourceValue, constant_value, form_at};
 use super::islands::is_junction;
 use super::map::Link;
-use super::names::Namer;
+use super::names::{Namer, common_part};
 use super::series_parallel::Item;
 use super::values::{Speaker, Unreadable, negate, product, signed, tidy};
 use super::{Builder, Mark};
@@ -478,12 +478,6 @@ impl Builder<'_> {
         });
         symbolic.map_or_else(|| Expr::number(value), |expr| self.constant(expr))
     }
-}
-
-/// What the names of two parts have in common of the instances that they stand in, `eha[2].`.
-fn common_part<'a>(a: &'a str, b: &str) -> &'a str {
-    let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
-    a.get(..same).and_then(|same| same.rfind('.')).map_or("", |dot| &a[..=dot])
 }
 
 /// A linear source for ± one voltage or ± one current of a voltage source; `None` for anything else.

@@ -1,7 +1,7 @@
 //! What is to be computed: parameters, options, saved variables, the transient, and the header that other simulators
 //! skip.
 
-use super::Builder;
+use super::{Builder, Mark};
 use super::values::Speaker;
 use crate::bond::graph::{Expr as GraphExpr, Leaf, ParameterId};
 use crate::diagnostic::Diagnostic;
@@ -235,7 +235,7 @@ impl Builder<'_> {
 }
 
 /// Whether ngspice computes an expression in a `.param` as we do: sums, products, fractions and the plainest functions.
-fn portable(expr: &GraphExpr) -> bool {
+pub(super) fn portable(expr: &GraphExpr) -> bool {
     match &*expr.node {
         Node::Number(value) => value.is_finite(),
         Node::Leaf(_) => true,

@@ -138,7 +138,12 @@ impl Flows {
         let near = |c: &&Candidate| {
             (c.home != reader.home, !self.homes[bond.index()].contains(&c.home), c.rank)
         };
-        let found = others.min_by_key(near)?.carrier;
+        let found = others.min_by_key(near)?;
+        // Rather than look into another part, a law takes its own current for its argument.
+        let own = (found.home != reader.home).then(|| {
+            self.carriers[head].iter().find(|c| Some(c.carrier.device) == reader.except)
+        });
+        let found = own.flatten().unwrap_or(found).carrier;
         Some(Carrier { device: found.device, negated: found.negated ^ flipped })
     }
 

@@ -242,12 +242,24 @@ impl Namer {
         name
     }
 
+    /// A fresh name for a subcircuit.
+    pub fn subcircuit(&mut self, wanted: &str) -> Name {
+        let name = fresh(&mut self.nodes, &[], &ascii(wanted));
+        self.names.intern(&name)
+    }
+
     fn give(&mut self, wanted: &str, name: String) -> Name {
         if name != wanted {
             self.renamed.push(Renamed { from: wanted.to_string(), to: name.clone() });
         }
         self.names.intern(&name)
     }
+}
+
+/// What the names of two parts have in common of the instances that they stand in, `eha[2].`.
+pub fn common_part<'a>(a: &'a str, b: &str) -> &'a str {
+    let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+    a.get(..same).and_then(|same| same.rfind('.')).map_or("", |dot| &a[..=dot])
 }
 
 /// `wanted`, or with `_2`, `_3` … where it is taken or reserved.
