@@ -32,6 +32,7 @@ pub struct Lookup<'f, 'n> {
 }
 
 struct Paths {
+    scopes: HashMap<String, ScopeId>,
     nodes: HashMap<String, NodeId>,
     devices: HashMap<String, DeviceId>,
 }
@@ -46,7 +47,11 @@ impl<'f, 'n> Lookup<'f, 'n> {
         self.paths.get_or_init(|| {
             let nodes = self.flat.nodes.iter().enumerate();
             let devices = self.flat.devices.iter().enumerate();
+            let scopes = self.flat.scopes.all.iter().enumerate();
             Paths {
+                scopes: scopes
+                    .map(|(k, scope)| (scope.path.to_lowercase(), ScopeId(k as u32)))
+                    .collect(),
                 nodes: nodes
                     .map(|(k, node)| (node.name.to_lowercase(), NodeId(k as u32)))
                     .collect(),
@@ -62,6 +67,15 @@ impl<'f, 'n> Lookup<'f, 'n> {
     /// The value of an expression that must be a number.
     pub fn number(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<f64> {
         scope::number(&self.flat.scopes, id, expr, self.names, d)
+    }
+
+    /// Where a parameter is to be looked for, and its name there: `x1.x2.r` is that of an instance.
+    pub fn parameter(&self, id: ScopeId, name: Name) -> (ScopeId, Name) {
+        let found = self.names.text(name).rsplit_once('.').and_then(|(path, own)| {
+            let path = format!("{}{path}.", self.flat.scopes.get(id).path).to_lowercase();
+            Some((*self.paths().scopes.get(&path)?, self.names.find(own)?))
+        });
+        found.unwrap_or((id, name))
     }
 
     /// A node by its name in a scope, or by its full one (`x1.out`).
@@ -171,10 +185,11 @@ impl<'f, 'n> Lookup<'f, 'n> {
                     return self.varying(id, *name, d);
                 }
                 Leaf::Parameter(name) => {
+                    let (place, own) = self.parameter(id, *name);
                     let value = self
                         .flat
                         .scopes
-                        .parameter(id, *name)
+                        .parameter(place, own)
                         .or_else(|| scope::constant(self.names.text(*name)));
                     if value.is_none() {
                         let error = scope::unknown_parameter(
