@@ -15,12 +15,13 @@ use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::netlist::header::Header;
 use crate::netlist::read::How;
-use crate::netlist::{Netlist, flatten, read, write};
+use crate::netlist::{CardKind, Netlist, flatten, read, write};
 use crate::quantity::{did_you_mean, nearest};
 use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
 use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
+use crate::translate::hierarchy::{self, Hierarchy};
 use crate::translate::{self, Translation};
 use crate::verify::{self, Report};
 
@@ -177,6 +178,13 @@ pub fn model(
     let initial = initial::solve(&graph, &causality, d)?;
     let translation = translate::translate(&graph, &causality, &initial, map, d)?;
     Some(Model { graph, causality, initial, translation })
+}
+
+impl Model {
+    /// The circuit with the graph's instances as subcircuits.
+    pub fn nested(&self, map: &SourceMap) -> Hierarchy {
+        hierarchy::fold(&self.graph, &self.causality, map, &self.translation)
+    }
 }
 
 /// A thousand rows where only the end of the run is said.
@@ -564,7 +572,7 @@ pub fn certificate(
     let text = match question.netlist {
         Some(file) => file,
         None => {
-            let text = write::write(&model.translation.netlist);
+            let text = write::write(&model.nested(map).netlist);
             map.add(format!("{}.cir", model.graph.name), text)
         }
     };
@@ -573,6 +581,11 @@ pub fn certificate(
         return None;
     }
     let mut translation = model.translation.clone();
+    // A text with subcircuits has other names than a flat one.
+    if netlist.cards.iter().any(|card| matches!(card.kind, CardKind::Subcircuit(_))) {
+        let nested = model.nested(map);
+        (translation.netlist, translation.map) = (nested.netlist, nested.map);
+    }
     if let Some(json) = &question.map {
         match translate::Map::from_json(json, &mut translation.netlist.names) {
             Some(map) => {

@@ -6,7 +6,8 @@ use super::{exact, values};
 use crate::bond::graph::BondGraph;
 use crate::bond::initial::InitialState;
 use crate::diagnostic::Diagnostic;
-use crate::netlist::{CardKind, Netlist, write};
+use crate::netlist::{Card, CardKind, Netlist, write};
+use crate::source::Span;
 use crate::translate::Translation;
 use std::collections::HashMap;
 
@@ -62,17 +63,7 @@ pub fn certify(
 
 /// Names the first card that is not as the translation writes it, beside the first variable that differs.
 fn suspect(mismatches: &mut [Mismatch], ours: &Netlist, theirs: &Netlist) {
-    let cards = |netlist: &Netlist| -> Vec<(String, String, crate::source::Span)> {
-        let devices = netlist.cards.iter().filter_map(|card| match &card.kind {
-            CardKind::Device(device) => {
-                let name = netlist.names.text(device.name).to_lowercase();
-                Some((name, write::card(&netlist.names, &card.kind).to_lowercase(), card.span))
-            }
-            _ => None,
-        });
-        devices.collect()
-    };
-    let (ours, theirs) = (cards(ours), cards(theirs));
+    let (ours, theirs) = (cards(ours, &ours.cards, ""), cards(theirs, &theirs.cards, ""));
     let known: HashMap<&str, &str> =
         ours.iter().map(|(name, text, _)| (name.as_str(), text.as_str())).collect();
     let there: HashMap<&str, usize> =
@@ -91,4 +82,24 @@ fn suspect(mismatches: &mut [Mismatch], ours: &Netlist, theirs: &Netlist) {
         (None, Some((name, ..))) => first.message.push_str(&format!("; the text has no `{name}`")),
         (None, None) => {}
     }
+}
+
+/// The name of each device with that of its subcircuit, its card, and where it stands.
+fn cards(netlist: &Netlist, cards: &[Card], within: &str) -> Vec<(String, String, Span)> {
+    let mut found = vec![];
+    for card in cards {
+        match &card.kind {
+            CardKind::Device(device) => {
+                let name = format!("{within}{}", netlist.names.text(device.name)).to_lowercase();
+                let text = write::card(&netlist.names, &card.kind).to_lowercase();
+                found.push((name, text, card.span));
+            }
+            CardKind::Subcircuit(inner) => {
+                let within = format!("{within}{}.", netlist.names.text(inner.name));
+                found.extend(self::cards(netlist, &inner.cards, &within));
+            }
+            _ => {}
+        }
+    }
+    found
 }

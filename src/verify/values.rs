@@ -81,12 +81,15 @@ impl Check<'_> {
 
     fn parameters(&mut self) {
         for (k, parameter) in self.graph.parameters.iter().enumerate() {
-            let Some(name) = self.text.parameters.get(k).copied().flatten() else { continue };
-            let value = self.text.flat.scopes.parameter(TOP, name).unwrap_or(f64::NAN);
+            let Some((scope, name)) = self.text.parameters.get(k).copied().flatten() else {
+                continue;
+            };
+            let value = self.text.flat.scopes.parameter(scope, name).unwrap_or(f64::NAN);
             self.compared += 1;
             if !equal(value, parameter.value) {
                 let why = format!("it is {value:e}, not {:e}", parameter.value);
-                self.wrong(&format!(".param {}", self.text.netlist.names.text(name)), why);
+                let path = &self.text.flat.scopes.get(scope).path;
+                self.wrong(&format!(".param {path}{}", self.text.names.text(name)), why);
             }
         }
     }
@@ -367,7 +370,7 @@ impl Check<'_> {
     /// Everything that a column reads is saved and printed.
     fn saved(&mut self) {
         let text = self.text;
-        let mut names = text.netlist.names.clone();
+        let mut names = text.names.clone();
         let mut items: [Vec<netlist::Leaf>; 2] = [vec![], vec![]];
         let mut all = [false; 2];
         for card in &text.netlist.cards {

@@ -221,7 +221,8 @@ impl Writer<'_> {
         cards.splice(0..0, inlined.iter().map(comment));
         let (header, map) = told::told(self.naming, self.tree, &mut names, &mut cards);
         let title = self.flat.netlist.title.clone();
-        let netlist = Netlist { title, names: names.names, header, cards };
+        let dialect = self.flat.netlist.dialect;
+        let netlist = Netlist { title, dialect, names: names.names, header, cards };
         Hierarchy { netlist, map, inlined, subcircuits }
     }
 

@@ -239,7 +239,7 @@ fn columns<F: Modular>(
             drawn.mismatches.push(Mismatch::of(&name, &why));
         }
         let factor = decimal::<F>(observation.unit.1).unwrap_or(F::ONE);
-        let mut names = text.netlist.names.clone();
+        let mut names = text.names.clone();
         let read = expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
         // Names that are new stand for nothing.
         let mut known = true;
@@ -248,7 +248,7 @@ fn columns<F: Modular>(
             continue;
         };
         read.leaves(&mut |leaf, _| {
-            let there = |name: &crate::netlist::Name| (name.0 as usize) < text.netlist.names.len();
+            let there = |name: &crate::netlist::Name| (name.0 as usize) < text.names.len();
             known &= match leaf {
                 Leaf::Voltage(a, b) => there(a) && b.as_ref().is_none_or(there),
                 Leaf::Parameter(name) | Leaf::Current(name) => there(name),

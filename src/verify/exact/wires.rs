@@ -38,11 +38,11 @@ pub struct CutCard {
 pub struct Wires<'t, F> {
     /// The text.
     pub text: &'t Text<'t>,
-    lookup: Lookup<'t, 't>,
+    pub(super) lookup: Lookup<'t, 't>,
     graph: &'t BondGraph,
     bonds: &'t Bonds<'t, F>,
     /// By the name of a parameter at the top: the graph's.
-    parameters: HashMap<Name, usize>,
+    parameters: HashMap<(u32, Name), usize>,
     known: RefCell<HashMap<(u32, Name), F>>,
     /// The equations.
     pub system: System<F>,
@@ -63,10 +63,12 @@ impl<'t, F: Modular> Wires<'t, F> {
         let parameters = text.parameters.iter().enumerate();
         let mut wires = Wires {
             text,
-            lookup: Lookup::new(&text.flat, &text.netlist.names),
+            lookup: Lookup::new(&text.flat, &text.names),
             graph: bonds.graph,
             bonds,
-            parameters: parameters.filter_map(|(k, name)| Some(((*name)?, k))).collect(),
+            parameters: parameters
+                .filter_map(|(k, place)| place.map(|(scope, name)| ((scope.0, name), k)))
+                .collect(),
             known: RefCell::new(HashMap::new()),
             system: System { unknowns: text.circuit.nodes.len() - 1, rows: vec![] },
             currents: vec![Form::number(F::ZERO); text.flat.devices.len()],
@@ -190,7 +192,7 @@ impl<'t, F: Modular> Wires<'t, F> {
     /// # Errors
     /// What is not there.
     pub fn leaf(&self, scope: ScopeId, leaf: &Leaf) -> Result<Form<F>, Trouble> {
-        let names = &self.text.netlist.names;
+        let names = &self.text.names;
         let unknown = |name: Name| Trouble::Unknown(names.text(name).to_string());
         let node = |name: Name| {
             let node = self.lookup.node(scope, name, crate::source::Span::NONE, &mut vec![]);
@@ -227,19 +229,18 @@ impl<'t, F: Modular> Wires<'t, F> {
 
     /// A parameter: the graph's where it has one of this name, else as the text defines it.
     fn parameter(&self, scope: ScopeId, name: Name) -> Result<F, Trouble> {
+        let (scope, name) = self.lookup.parameter(scope, name);
         let scopes = &self.text.flat.scopes;
         let found =
             scopes.around(scope).find_map(|(id, scope)| Some((id, *scope.written.get(&name)?)));
-        let text = self.text.netlist.names.text(name);
+        let text = self.text.names.text(name);
         let Some((id, (within, expr))) = found else {
             return scope::constant(text)
                 .and_then(decimal)
                 .ok_or_else(|| Trouble::Unknown(text.to_string()));
         };
-        if id == TOP
-            && let Some(value) =
-                self.parameters.get(&name).and_then(|k| self.bonds.parameters.get(*k))
-        {
+        let drawn = self.parameters.get(&(id.0, name));
+        if let Some(value) = drawn.and_then(|k| self.bonds.parameters.get(*k)) {
             return Ok(*value);
         }
         if let Some(value) = self.known.borrow().get(&(id.0, name)) {
@@ -255,10 +256,10 @@ impl<'t, F: Modular> Wires<'t, F> {
     /// # Errors
     /// What has no value in this draw.
     pub fn written_parameter(&self, id: ParameterId) -> Result<Option<F>, Trouble> {
-        let Some(name) = self.text.parameters.get(id.index()).copied().flatten() else {
+        let Some((scope, name)) = self.text.parameters.get(id.index()).copied().flatten() else {
             return Ok(None);
         };
-        let written = self.text.flat.scopes.get(TOP).written.get(&name);
+        let written = self.text.flat.scopes.get(scope).written.get(&name);
         let Some((scope, expr)) = written else { return Ok(None) };
         let mut parameters = 0;
         expr.leaves(&mut |_, _| parameters += 1);
