@@ -7,6 +7,7 @@ mod translated;
 use bondspice::bond::elaborate::Overrides;
 use bondspice::expr::Expr;
 use bondspice::netlist::Leaf;
+use bondspice::netlist::write::expression;
 use bondspice::second;
 use bondspice::trace::{Trace, compare, formats};
 use std::io::Write;
@@ -42,8 +43,8 @@ fn run_as(model: &Translated, text: &str) -> Trace {
     assert!(output.status.success(), "{}\n{said}\n{}", model.graph.name, model.text());
     let bytes = std::fs::read(&raw).unwrap_or_else(|_| panic!("{}\n{said}", model.graph.name));
     let result = formats::read("deck.raw", &bytes).unwrap();
-    let names = &model.translation.netlist.names;
-    let map = &model.translation.map;
+    let names = &model.nested.netlist.names;
+    let map = &model.nested.map;
     let ground = names.find("0").unwrap();
     let observed: Vec<_> = map.variables.iter().filter(|variable| variable.observed).collect();
     let mut trace = Trace::new(
@@ -67,7 +68,7 @@ fn run_as(model: &Translated, text: &str) -> Trace {
                 Leaf::Voltage(plus, Some(minus)) => {
                     voltage(*plus).iter().zip(voltage(*minus)).map(|(a, b)| a - b).collect()
                 }
-                Leaf::Current(device) => column(format!("i({})", names.text(*device))).to_vec(),
+                Leaf::Current(_) => column(expression(names, &Expr::leaf(leaf.clone()))).to_vec(),
                 Leaf::Time => result.time().to_vec(),
                 Leaf::Parameter(name) => {
                     let value = map.parameters.iter().find(|(known, _)| known == name).unwrap().1;

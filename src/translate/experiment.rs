@@ -1,8 +1,8 @@
 //! What is to be computed: parameters, options, saved variables, the transient, and the header that other simulators
 //! skip.
 
-use super::{Builder, Mark};
 use super::values::Speaker;
+use super::{Builder, Mark};
 use crate::bond::graph::{Expr as GraphExpr, Leaf, ParameterId};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Function, Node, Unary};

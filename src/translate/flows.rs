@@ -140,9 +140,8 @@ impl Flows {
         };
         let found = others.min_by_key(near)?;
         // Rather than look into another part, a law takes its own current for its argument.
-        let own = (found.home != reader.home).then(|| {
-            self.carriers[head].iter().find(|c| Some(c.carrier.device) == reader.except)
-        });
+        let own = (found.home != reader.home)
+            .then(|| self.carriers[head].iter().find(|c| Some(c.carrier.device) == reader.except));
         let found = own.flatten().unwrap_or(found).carrier;
         Some(Carrier { device: found.device, negated: found.negated ^ flipped })
     }

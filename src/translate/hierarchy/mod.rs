@@ -36,8 +36,8 @@ use parts::Part;
 use ports::Blocks;
 use std::collections::HashMap;
 use tree::Tree;
-use words::Words;
 use variants::{Body, Definitions, Public};
+use words::Words;
 
 /// A circuit with subcircuits.
 #[derive(Clone, Debug)]
@@ -187,8 +187,10 @@ impl Writer<'_> {
         let depths: Vec<usize> = scopes.iter().map(|scope| self.tree.depth(*scope)).collect();
         let mut subcircuits = vec![];
         for depth in (1..=depths.iter().copied().max().unwrap_or(0)).rev() {
-            let level: Vec<u32> =
-                (scopes.iter().zip(&depths)).filter(|(_, d)| **d == depth).map(|(s, _)| *s).collect();
+            let level: Vec<u32> = (scopes.iter().zip(&depths))
+                .filter(|(_, d)| **d == depth)
+                .map(|(s, _)| *s)
+                .collect();
             let bodies: Vec<Body> =
                 level.iter().map(|scope| self.body(*scope, &uses, &mut names)).collect();
             let found: Vec<usize> =
@@ -199,8 +201,10 @@ impl Writer<'_> {
                 let differs = definition.vary(&members);
                 for k in own() {
                     let given = bodies[k].publics.iter();
-                    let given = given.filter_map(|public| Some((public.name, public.given.clone()?)));
-                    let lifts = bodies[k].lifts.iter().zip(&differs).filter(|(_, differs)| **differs);
+                    let given =
+                        given.filter_map(|public| Some((public.name, public.given.clone()?)));
+                    let lifts =
+                        bodies[k].lifts.iter().zip(&differs).filter(|(_, differs)| **differs);
                     let own = lifts.map(|(lift, _)| lift.clone()).collect();
                     let subcircuit = definition.name;
                     let name = self.tree.instances[level[k] as usize].name.clone();
@@ -213,12 +217,10 @@ impl Writer<'_> {
         let inlined = (self.tree.instances.iter().zip(&self.tree.inlined))
             .filter_map(|(instance, why)| Some((instance.name.clone(), why.clone()?)));
         let inlined: Vec<(String, String)> = inlined.collect();
-        let comment = |(name, why): &(String, String)| Card {
-            kind: CardKind::Comment(format!(" {name} stands inlined: {why}")),
-            span: Span::NONE,
-            comment: None,
-        };
-        cards.splice(0..0, inlined.iter().map(comment));
+        let said = inlined.iter().flat_map(|(name, why)| {
+            [comment(&format!(" {name} stands inlined:")), comment(&format!("   {why}"))]
+        });
+        cards.splice(0..0, said);
         let (header, map) = told::told(self.naming, self.tree, &mut names, &mut cards);
         let title = self.flat.netlist.title.clone();
         let dialect = self.flat.netlist.dialect;
@@ -423,11 +425,6 @@ impl Writer<'_> {
         let own = (0..self.graph.parameters.len())
             .filter(|at| self.naming.owners.get(&self.flat.map.parameters[*at].0) == Some(&0));
         let own = self.private(0, own.collect(), names, &mut none);
-        let comment = |text: &str| Card {
-            kind: CardKind::Comment(text.to_string()),
-            span: Span::NONE,
-            comment: None,
-        };
         if !own.is_empty() {
             cards.push(comment(" parameters, in SI units"));
         }
@@ -465,4 +462,8 @@ impl Writer<'_> {
         cards.append(&mut instances);
         cards
     }
+}
+
+fn comment(text: &str) -> Card {
+    Card { kind: CardKind::Comment(text.to_string()), span: Span::NONE, comment: None }
 }

@@ -140,7 +140,14 @@ impl<'f> Naming<'f> {
 
     /// Where each node is at home: in the innermost subcircuit around all that touch it. Ports and outputs are touched
     /// from outside, whether or not anything is joined to them.
-    fn find_meets(&mut self, scopes: &[u32], parts: &[Part], places: &Places, tree: &Tree, ports: &Ports) {
+    fn find_meets(
+        &mut self,
+        scopes: &[u32],
+        parts: &[Part],
+        places: &Places,
+        tree: &Tree,
+        ports: &Ports,
+    ) {
         let mut touch = |node: Name, scope: u32| {
             let at = self.meets.entry(node).or_insert(scope);
             *at = tree.common(*at, scope);
@@ -148,7 +155,8 @@ impl<'f> Naming<'f> {
         for (part, place) in parts.iter().zip(places) {
             part.nodes.iter().for_each(|node| touch(*node, *place));
         }
-        let known: HashSet<Name> = parts.iter().flat_map(|part| part.nodes.iter().copied()).collect();
+        let known: HashSet<Name> =
+            parts.iter().flat_map(|part| part.nodes.iter().copied()).collect();
         for scope in scopes.iter().copied().filter(|scope| *scope > 0) {
             let around = tree.around(scope);
             for port in ports.get(&scope).into_iter().flatten() {
@@ -157,7 +165,9 @@ impl<'f> Naming<'f> {
             }
             for signal in &tree.instances[scope as usize].outputs {
                 let node = self.flat.origins.signals.get(signal.index()).copied().flatten();
-                node.filter(|node| known.contains(node)).into_iter().for_each(|node| touch(node, around));
+                node.filter(|node| known.contains(node))
+                    .into_iter()
+                    .for_each(|node| touch(node, around));
             }
         }
     }
@@ -172,7 +182,9 @@ impl<'f> Naming<'f> {
         }
         for inner in &local.inner {
             let terminals = &self.locals[*inner as usize].terminals;
-            needed.extend(terminals.iter().map(|(_, node)| node.0).filter(|node| *node != self.ground));
+            needed.extend(
+                terminals.iter().map(|(_, node)| node.0).filter(|node| *node != self.ground),
+            );
         }
         // What came in from around goes by what is left of its name behind what both stand in.
         let own = |wish: &str| wish[common_part(wish, &prefix).len()..].to_string();
@@ -188,7 +200,8 @@ impl<'f> Naming<'f> {
                     local.terminal(node, &format!("{}_{side}", port.name));
                 }
             }
-            let outside = |node: &Name| self.meets.get(node).is_some_and(|at| !tree.within(*at, scope));
+            let outside =
+                |node: &Name| self.meets.get(node).is_some_and(|at| !tree.within(*at, scope));
             let instance = &tree.instances[scope as usize];
             for signal in instance.inputs.iter().chain(&instance.outputs) {
                 let node = self.flat.origins.signals.get(signal.index()).copied().flatten();

@@ -74,14 +74,23 @@ impl Blocks {
     }
 
     /// Why an instance with these ports cannot be a subcircuit; `None` when it can.
-    pub fn obstacle(&self, tree: &Tree, instance: u32, ports: &[Port], names: &Names) -> Option<String> {
+    pub fn obstacle(
+        &self,
+        tree: &Tree,
+        instance: u32,
+        ports: &[Port],
+        names: &Names,
+    ) -> Option<String> {
         let mut own: BTreeMap<usize, Vec<&Port>> = BTreeMap::new();
         for port in ports {
             let [plus, minus] = port.nodes;
             let (a, b) = (self.block(&[plus]), self.block(&[minus]));
             match (a, b) {
                 (Some(a), Some(b)) if a != b => {
-                    return Some(format!("the sides of its port {} meet at ground alone", port.name));
+                    return Some(format!(
+                        "the sides of its port {} meet at ground alone",
+                        port.name
+                    ));
                 }
                 (None, None) => return Some(format!("its port {} is shorted", port.name)),
                 (Some(block), _) | (_, Some(block)) => own.entry(block).or_default().push(port),

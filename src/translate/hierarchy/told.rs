@@ -50,7 +50,14 @@ pub fn told(
     }
     let mut flat_names = flat.names.clone();
     for column in &mut header.columns {
-        let read = expression(&column.expr, &mut flat_names, flat.dialect, FileId(u32::MAX), 0, &mut vec![]);
+        let read = expression(
+            &column.expr,
+            &mut flat_names,
+            flat.dialect,
+            FileId(u32::MAX),
+            0,
+            &mut vec![],
+        );
         if let Some(expr) = read {
             let expr = paths.expr(&expr);
             column.expr = write::expression(&paths.names.names, &expr);

@@ -129,8 +129,7 @@ impl Definition {
         let lifts = self.body.lifts.iter().zip(&self.varies).filter(|(_, varies)| **varies);
         parameters.extend(lifts.map(|(lift, _)| (lift.name, Expr::number(lift.value))));
         let ports = self.body.terminals.clone();
-        let kind =
-            CardKind::Subcircuit(Subcircuit { name: self.name, ports, parameters, cards });
+        let kind = CardKind::Subcircuit(Subcircuit { name: self.name, ports, parameters, cards });
         Card { kind, span: Span::NONE, comment: None }
     }
 }
@@ -153,7 +152,8 @@ fn key(body: &Body, names: &Words) -> String {
         key.push(' ');
     }
     for public in &body.publics {
-        let default = public.default.as_ref().map(|default| write::expression(&names.names, default));
+        let default =
+            public.default.as_ref().map(|default| write::expression(&names.names, default));
         key.push_str(&format!("{}={} ", names.text(public.name), default.unwrap_or_default()));
     }
     for card in &body.cards {
