@@ -53,7 +53,8 @@ fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
     source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
 }
 
-fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
+/// The same for each of a device.
+pub(super) fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut device.element {
         Element::Resistor { value } => visit(value),
         Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {
