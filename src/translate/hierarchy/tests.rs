@@ -25,7 +25,7 @@ fn folded(text: &str) -> (Hierarchy, String) {
 }
 
 const PI: &str = "model Pi(R, C = 1) { port in a; port out b\n a -> 0:left -> 1:through -> 0:right -> b\n \
-                  through -> R\n left -> C:C1(C)\n right -> C:C2(C) }\n";
+                  through -> R:R\n left -> C:C1(C)\n right -> C:C2(C) }\n";
 
 #[test]
 fn equal_instances_share_a_subcircuit_and_overrides_stand_at_the_instance() {
