@@ -1,7 +1,8 @@
 //! What a device speaks of: nodes, other devices, models, expressions. Whoever renames or counts them needs no table of
 //! devices of its own.
 
-use super::{Device, Element, Expr, Name, Source, Waveform};
+use super::visit::device_mut;
+use super::{Device, Element, Expr, Name};
 
 /// Something that a device speaks of.
 pub enum Reference<'a> {
@@ -22,42 +23,17 @@ impl Device {
     pub fn references(&mut self, visit: &mut dyn FnMut(Reference)) {
         visit(Reference::Terminals(&mut self.nodes));
         match &mut self.element {
-            Element::Resistor { value } => visit(Reference::Expr(value)),
-            Element::Capacitor { value, initial }
-            | Element::Inductor { value, initial }
-            | Element::Charge { law: value, initial }
-            | Element::Flux { law: value, initial } => {
-                visit(Reference::Expr(value));
-                initial.iter_mut().for_each(|initial| visit(Reference::Expr(initial)));
-            }
             Element::Passive(passive) => {
                 passive.model.iter_mut().for_each(|model| visit(Reference::Model(model)));
-                let values = passive.value.iter_mut().chain(&mut passive.initial);
-                values.for_each(|value| visit(Reference::Expr(value)));
-                passive.parameters.iter_mut().for_each(|(_, value)| visit(Reference::Expr(value)));
             }
-            Element::Mutual { inductors, coupling } => {
+            Element::Mutual { inductors, .. } => {
                 inductors.iter_mut().for_each(|inductor| visit(Reference::Device(inductor)));
-                visit(Reference::Expr(coupling));
             }
-            Element::VoltageSource(source) | Element::CurrentSource(source) => {
-                self::source(source, visit);
-            }
-            Element::Vcvs { gain, control } | Element::Vccs { gain, control } => {
+            Element::Vcvs { control, .. } | Element::Vccs { control, .. } => {
                 visit(Reference::Control(control));
-                visit(Reference::Expr(gain));
             }
-            Element::Cccs { gain, control } | Element::Ccvs { gain, control } => {
+            Element::Cccs { control, .. } | Element::Ccvs { control, .. } => {
                 visit(Reference::Device(control));
-                visit(Reference::Expr(gain));
-            }
-            Element::Line { impedance, delay, initial } => {
-                visit(Reference::Expr(impedance));
-                visit(Reference::Expr(delay));
-                initial.iter_mut().flatten().for_each(|initial| visit(Reference::Expr(initial)));
-            }
-            Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => {
-                visit(Reference::Expr(law));
             }
             Element::Switch { model, control, .. } => {
                 visit(Reference::Control(control));
@@ -67,36 +43,21 @@ impl Device {
                 visit(Reference::Device(control));
                 visit(Reference::Model(model));
             }
-            Element::LawSwitch { model, control, .. } => {
-                visit(Reference::Expr(control));
+            Element::LawSwitch { model, .. } | Element::Diode { model, .. } => {
                 visit(Reference::Model(model));
             }
-            Element::Diode { model, area, parameters } => {
-                parameters.iter_mut().for_each(|(_, value)| visit(Reference::Expr(value)));
-                visit(Reference::Model(model));
-                area.iter_mut().for_each(|area| visit(Reference::Expr(area)));
-            }
-            Element::Instance { parameters, .. } => {
-                parameters.iter_mut().for_each(|(_, value)| visit(Reference::Expr(value)));
-            }
+            Element::Resistor { .. }
+            | Element::Capacitor { .. }
+            | Element::Inductor { .. }
+            | Element::Charge { .. }
+            | Element::Flux { .. }
+            | Element::VoltageSource(_)
+            | Element::CurrentSource(_)
+            | Element::Line { .. }
+            | Element::BehaviouralVoltage { .. }
+            | Element::BehaviouralCurrent { .. }
+            | Element::Instance { .. } => {}
         }
+        device_mut(self, &mut |expr| visit(Reference::Expr(expr)));
     }
-}
-
-fn source(source: &mut Source, visit: &mut dyn FnMut(Reference)) {
-    match &mut source.waveform {
-        Waveform::Constant(value) => visit(Reference::Expr(value)),
-        Waveform::Function { arguments, .. } => {
-            arguments.iter_mut().for_each(|argument| visit(Reference::Expr(argument)));
-        }
-        Waveform::Points { points, repeat, delay } => {
-            let values = points.iter_mut().chain(repeat).chain(delay);
-            values.for_each(|value| visit(Reference::Expr(value)));
-        }
-        Waveform::Pattern { arguments, repeat, .. } => {
-            arguments.iter_mut().chain(repeat).for_each(|value| visit(Reference::Expr(value)));
-        }
-    }
-    source.dc.iter_mut().for_each(|value| visit(Reference::Expr(value)));
-    source.ac.iter_mut().flatten().for_each(|value| visit(Reference::Expr(value)));
 }

@@ -1,16 +1,11 @@
 //! Every expression of a card, for what has to look at or change all of them.
 
-use super::references::Reference;
-use super::{Card, CardKind, Expr, MeasureKind};
+use super::{Card, CardKind, Device, Element, Expr, MeasureKind, Source, Waveform};
 
 /// Calls `visit` for each expression of a card, but not of the cards within a subcircuit or a choice.
 pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut card.kind {
-        CardKind::Device(device) => device.references(&mut |reference| {
-            if let Reference::Expr(expr) = reference {
-                visit(expr);
-            }
-        }),
+        CardKind::Device(device) => device_mut(device, visit),
         CardKind::Parameters(values) | CardKind::Initial(values) | CardKind::Guess(values) => {
             values.iter_mut().for_each(|(_, value)| visit(value));
         }
@@ -50,5 +45,61 @@ fn measure_mut(kind: &mut MeasureKind, visit: &mut dyn FnMut(&mut Expr)) {
     };
     if let Some(changed) = kind.try_map(&mut &changed, &mut &changed) {
         *kind = changed;
+    }
+}
+
+fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
+    match &mut source.waveform {
+        Waveform::Constant(value) => visit(value),
+        Waveform::Function { arguments, .. } => arguments.iter_mut().for_each(&mut *visit),
+        Waveform::Points { points, repeat, delay } => {
+            points.iter_mut().chain(repeat).chain(delay).for_each(&mut *visit);
+        }
+        Waveform::Pattern { arguments, repeat, .. } => {
+            arguments.iter_mut().chain(repeat).for_each(&mut *visit);
+        }
+    }
+    source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
+}
+
+/// The same for each of a device.
+pub(super) fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
+    match &mut device.element {
+        Element::Resistor { value } => visit(value),
+        Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {
+            visit(value);
+            initial.iter_mut().for_each(visit);
+        }
+        Element::Mutual { coupling, .. } => visit(coupling),
+        Element::VoltageSource(source) | Element::CurrentSource(source) => {
+            source_mut(source, visit);
+        }
+        Element::Vcvs { gain, .. }
+        | Element::Vccs { gain, .. }
+        | Element::Cccs { gain, .. }
+        | Element::Ccvs { gain, .. } => visit(gain),
+        Element::Line { impedance, delay, initial } => {
+            visit(impedance);
+            visit(delay);
+            initial.iter_mut().flatten().for_each(visit);
+        }
+        Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
+        Element::Charge { law, initial } | Element::Flux { law, initial } => {
+            visit(law);
+            initial.iter_mut().for_each(visit);
+        }
+        Element::Passive(passive) => {
+            passive.value.iter_mut().chain(&mut passive.initial).for_each(&mut *visit);
+            passive.parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        Element::LawSwitch { control, .. } => visit(control),
+        Element::Switch { .. } | Element::CurrentSwitch { .. } => {}
+        Element::Diode { area, parameters, .. } => {
+            area.iter_mut().for_each(&mut *visit);
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        Element::Instance { parameters, .. } => {
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
     }
 }
