@@ -77,7 +77,7 @@ fn cases() -> Vec<Tree> {
         cases.push(Expr::choice(positive, Expr::call(Function::Sqrt, vec![x(k)]), -x(k)));
     }
     // Tables hold their ends.
-    let table = Arc::new(Table { x: vec![-2.0, 0.0, 1.0, 2.0], y: vec![1.0, -1.0, 4.0, 10.0] });
+    let table = Arc::new(Table::lines(vec![-2.0, 0.0, 1.0, 2.0], vec![1.0, -1.0, 4.0, 10.0]));
     for k in 0..6 {
         cases.push(Expr::new(Node::Table(x(k), table.clone()), Span::NONE));
     }

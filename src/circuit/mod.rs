@@ -116,6 +116,22 @@ pub enum DeviceKind {
     BehaviouralCurrent {
         law: Expr,
     },
+    /// v = law·i.
+    BehaviouralResistor {
+        law: Expr,
+    },
+    /// q = law, or i = law·dv/dt.
+    BehaviouralCapacitor {
+        law: Expr,
+        law_of: LawOf,
+        initial: Option<f64>,
+    },
+    /// Φ = law, or v = law·di/dt.
+    BehaviouralInductor {
+        law: Expr,
+        law_of: LawOf,
+        initial: Option<f64>,
+    },
     /// Two-state switch with hysteresis, by a voltage or a current.
     Switch {
         control: Expr,
@@ -125,6 +141,30 @@ pub enum DeviceKind {
         off_resistance: f64,
         initially_on: Option<bool>,
     },
+    /// Switch whose two states within the band of its thresholds are turned round (a negative hysteresis).
+    CrossedSwitch {
+        control: Expr,
+        above: f64,
+        below: f64,
+        on_resistance: f64,
+        off_resistance: f64,
+        initially_on: Option<bool>,
+    },
+    /// Switch whose resistance goes over smoothly.
+    SmoothSwitch {
+        control: Expr,
+        /// Where it is wholly on, wholly off.
+        on: f64,
+        off: f64,
+        /// Where it begins to turn off when on, to turn on when off; without them at `on` and at `off`.
+        holds_on: Option<f64>,
+        holds_off: Option<f64>,
+        on_resistance: f64,
+        off_resistance: f64,
+        initially_on: Option<bool>,
+    },
+    /// A value that laws speak of and that no tree of theirs can say; its current is that value.
+    Quantity(Quantity),
     /// Lossless transmission line between two ports.
     Line {
         impedance: f64,
@@ -137,11 +177,34 @@ pub enum DeviceKind {
         period: f64,
         round: u32,
     },
-    /// Junction diode, level 1.
+    /// Junction diode.
     Diode {
         model: DiodeModel,
-        area: f64,
+        instance: DiodeInstance,
     },
+}
+
+/// What the law of a behavioural capacitor or inductor gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LawOf {
+    /// The charge or the flux.
+    Stored,
+    /// The capacitance or the inductance: what the rate is multiplied with.
+    Factor,
+}
+
+/// A value over time that follows from more than the present.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum Quantity {
+    /// d/dt of a law.
+    Derivative { law: Expr },
+    /// The integral of a law over time from `initial` on; `pinned` where an operating point holds it there.
+    Integral { law: Expr, initial: f64, pinned: bool },
+    /// A law as it was a time ago.
+    Delay { law: Expr, by: f64 },
+    /// A function of time with corners.
+    Signal { waveform: Waveform },
 }
 
 /// What an independent source is outside a run over time.
@@ -162,7 +225,7 @@ pub struct Phasor {
     pub phase: f64,
 }
 
-/// Parameters of the level-1 diode in SI, at the nominal temperature of 27 °C.
+/// Parameters of the diode in SI, as the model card gives them, at its nominal temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct DiodeModel {
@@ -176,6 +239,87 @@ pub struct DiodeModel {
     pub forward_bias_depletion: f64,
     pub breakdown_voltage: Option<f64>,
     pub breakdown_current: f64,
+    /// Without one that of the forward direction.
+    pub breakdown_emission: Option<f64>,
+    /// Recombination in the space charge: saturation current and emission.
+    pub recombination_current: f64,
+    pub recombination_emission: f64,
+    /// The current above which the forward current goes with half the exponent, and the law of it.
+    pub knee: Option<(f64, Knee)>,
+    /// Band gap in eV, and the exponent of the temperature in Is.
+    pub energy_gap: f64,
+    pub saturation_exponent: f64,
+    /// In °C.
+    pub nominal_temperature: f64,
+    /// Linear and quadratic change of Rs, of M, and linear change of TT, per K.
+    pub resistance_slopes: [f64; 2],
+    pub grading_slopes: [f64; 2],
+    pub transit_slopes: [f64; 2],
+    /// Per metre of the perimeter: saturation current, capacitance; and potential, grading, FC of the sidewall.
+    pub sidewall_current: f64,
+    pub sidewall_capacitance: f64,
+    pub sidewall_potential: f64,
+    pub sidewall_grading: f64,
+    pub sidewall_depletion: f64,
+}
+
+impl DiodeModel {
+    /// The defaults of SPICE: nothing but an exponential of 1e-14 A.
+    pub const DEFAULT: DiodeModel = DiodeModel {
+        saturation_current: 1e-14,
+        emission: 1.0,
+        series_resistance: 0.0,
+        junction_capacitance: 0.0,
+        junction_potential: 1.0,
+        grading: 0.5,
+        transit_time: 0.0,
+        forward_bias_depletion: 0.5,
+        breakdown_voltage: None,
+        breakdown_current: 1e-3,
+        breakdown_emission: None,
+        recombination_current: 0.0,
+        recombination_emission: 2.0,
+        knee: None,
+        energy_gap: 1.11,
+        saturation_exponent: 3.0,
+        nominal_temperature: 27.0,
+        resistance_slopes: [0.0; 2],
+        grading_slopes: [0.0; 2],
+        transit_slopes: [0.0; 2],
+        sidewall_current: 0.0,
+        sidewall_capacitance: 0.0,
+        sidewall_potential: 1.0,
+        sidewall_grading: 0.33,
+        sidewall_depletion: 0.5,
+    };
+}
+
+/// How high injection lessens a forward current i, with the knee at k.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knee {
+    /// i/(1 + √(i/k)).
+    Quotient,
+    /// i·√(k/(k + i)).
+    Root,
+}
+
+/// One diode of a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiodeInstance {
+    /// Relative area.
+    pub area: f64,
+    /// Perimeter, as the sidewall's parameters take it.
+    pub perimeter: f64,
+    /// How many in parallel.
+    pub multiplicity: f64,
+    /// In °C.
+    pub temperature: f64,
+}
+
+impl Default for DiodeInstance {
+    fn default() -> DiodeInstance {
+        DiodeInstance { area: 1.0, perimeter: 0.0, multiplicity: 1.0, temperature: 27.0 }
+    }
 }
 
 /// An output column.

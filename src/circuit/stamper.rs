@@ -4,7 +4,7 @@ use super::devices::{self, Branch};
 use super::stamps::{
     Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
 };
-use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Parts, Waveform};
+use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Parts, Quantity, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary};
 
@@ -23,6 +23,7 @@ pub struct Stamper<'a> {
 struct Slots {
     branch: Option<UnknownId>,
     second: Option<UnknownId>,
+    hidden: [Option<UnknownId>; 2],
     internal: Option<UnknownId>,
     charge: Option<u32>,
     mode: Option<u32>,
@@ -105,7 +106,14 @@ impl<'a> Stamper<'a> {
             if needs.charge {
                 slot.charge = Some(stamps.charges.len() as u32);
                 let (linear, into) = (vec![], vec![]);
-                stamps.charges.push(Charge { device: id, linear, law: None, into, initial: None });
+                stamps.charges.push(Charge {
+                    device: id,
+                    linear,
+                    law: None,
+                    into,
+                    initial: None,
+                    pinned: false,
+                });
             }
             if needs.mode {
                 slot.mode = Some(stamps.modes.len() as u32);
@@ -141,6 +149,20 @@ impl<'a> Stamper<'a> {
                     name: format!("i({}#2)", device.name.to_lowercase()),
                     voltage: false,
                     nominal: device.nominal,
+                    device: Some(id),
+                    span: device.span,
+                });
+            }
+        }
+        for (id, device) in circuit.ids() {
+            let hidden = (devices::row(&device.kind).needs)(&device.kind).hidden;
+            for slot in slots[id.0 as usize].hidden.iter_mut().take(hidden) {
+                *slot = Some(UnknownId(stamps.unknowns.len() as u32));
+                stamps.unknowns.push(Unknown {
+                    name: format!("u({})", device.name.to_lowercase()),
+                    // Like an internal node: no column of its own.
+                    voltage: true,
+                    nominal: None,
                     device: Some(id),
                     span: device.span,
                 });
@@ -191,6 +213,11 @@ impl<'a> Stamper<'a> {
         self.diagnostics.push(Diagnostic::error(code, span, message));
     }
 
+    /// Reports an error.
+    pub fn report(&mut self, error: Diagnostic) {
+        self.diagnostics.push(error);
+    }
+
     /// Reports a value that is not finite; says whether all are.
     pub fn finite(&mut self, id: DeviceId, values: &[(&str, f64)]) -> bool {
         let bad = values.iter().find(|(_, value)| !value.is_finite());
@@ -226,6 +253,11 @@ impl<'a> Stamper<'a> {
     /// The second branch current of a device that has one.
     pub fn second(&self, id: DeviceId) -> Option<UnknownId> {
         self.slots[id.0 as usize].second
+    }
+
+    /// A hidden unknown of a device that has as many.
+    pub fn hidden(&self, id: DeviceId, k: usize) -> Option<UnknownId> {
+        self.slots[id.0 as usize].hidden.get(k).copied().flatten()
     }
 
     /// The branch current of a device that has one.
@@ -394,10 +426,19 @@ fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
             DeviceKind::Cccs { control, .. } | DeviceKind::Ccvs { control, .. } => {
                 read[control.0 as usize] = true
             }
-            DeviceKind::BehaviouralVoltage { law } | DeviceKind::BehaviouralCurrent { law } => {
-                mark(law, &mut read)
-            }
-            DeviceKind::Switch { control, .. } => mark(control, &mut read),
+            DeviceKind::BehaviouralVoltage { law }
+            | DeviceKind::BehaviouralCurrent { law }
+            | DeviceKind::BehaviouralResistor { law }
+            | DeviceKind::BehaviouralCapacitor { law, .. }
+            | DeviceKind::BehaviouralInductor { law, .. }
+            | DeviceKind::Quantity(
+                Quantity::Derivative { law }
+                | Quantity::Integral { law, .. }
+                | Quantity::Delay { law, .. },
+            ) => mark(law, &mut read),
+            DeviceKind::Switch { control, .. }
+            | DeviceKind::CrossedSwitch { control, .. }
+            | DeviceKind::SmoothSwitch { control, .. } => mark(control, &mut read),
             _ => {}
         }
     }

@@ -87,6 +87,8 @@ pub struct Charge {
     pub into: Vec<(UnknownId, f64)>,
     /// Q at t = 0 where the card says so (`IC=`).
     pub initial: Option<f64>,
+    /// Whether an operating point holds it there.
+    pub pinned: bool,
 }
 
 /// A term of f: `law` enters each equation of `into` with its factor.

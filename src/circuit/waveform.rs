@@ -49,6 +49,21 @@ pub enum Waveform {
         index: f64,
         signal: f64,
     },
+    /// SPICE's AM(va vo mf fc td): va·(vo + sin(2π·mf·(t − td)))·sin(2π·fc·(t − td)), 0 before td.
+    Am {
+        amplitude: f64,
+        offset: f64,
+        signal: f64,
+        carrier: f64,
+        delay: f64,
+    },
+    /// Straight lines between (t, y) until `end`, then those from `from` to `end` again and again. `from` is the time of a
+    /// point, `end` that of the last one.
+    Repeating {
+        points: Vec<(f64, f64)>,
+        from: f64,
+        end: f64,
+    },
 }
 
 impl Waveform {
@@ -97,7 +112,10 @@ impl Waveform {
             Waveform::Sine { amplitude, .. } | Waveform::Sffm { amplitude, .. } => {
                 *amplitude == 0.0
             }
-            Waveform::Pwl(points) => points.windows(2).all(|pair| pair[0].1 == pair[1].1),
+            Waveform::Pwl(points) | Waveform::Repeating { points, .. } => {
+                points.windows(2).all(|pair| pair[0].1 == pair[1].1)
+            }
+            Waveform::Am { amplitude, .. } => *amplitude == 0.0,
             Waveform::Exponential { from, to, .. } => from == to,
         }
     }
@@ -160,17 +178,46 @@ impl Waveform {
                 };
                 Segment { start: *delay, end: f64::INFINITY, shape }
             }
-            Waveform::Pwl(points) => {
-                let after = points.partition_point(|(time, _)| reached(*time));
-                let before = after.checked_sub(1).and_then(|k| points.get(k));
-                match (before, points.get(after)) {
-                    (Some(&(t0, y0)), Some(&(t1, y1))) => {
-                        Segment { start: t0, end: t1, shape: Shape::Line { t0, y0, t1, y1 } }
-                    }
-                    (None, Some(&(t1, y1))) => Segment::constant(f64::NEG_INFINITY, t1, y1),
-                    (Some(&(t0, y0)), None) => Segment::constant(t0, f64::INFINITY, y0),
-                    (None, None) => Segment::constant(f64::NEG_INFINITY, f64::INFINITY, 0.0),
+            Waveform::Pwl(points) => between(points, &reached),
+            Waveform::Am { amplitude, offset, signal, carrier, delay } => {
+                if !reached(*delay) {
+                    return Segment::constant(f64::NEG_INFINITY, *delay, 0.0);
                 }
+                let shape = Shape::Am {
+                    amplitude: *amplitude,
+                    offset: *offset,
+                    signal: 2.0 * PI * signal,
+                    carrier: 2.0 * PI * carrier,
+                    delay: *delay,
+                };
+                Segment { start: *delay, end: f64::INFINITY, shape }
+            }
+            Waveform::Repeating { points, from, end } => {
+                if !reached(*end) {
+                    return between(points, &reached);
+                }
+                // Corners are always computed by this one formula, so that a step that landed on one is exactly on it.
+                let period = end - from;
+                let shift = |round: f64| round * period;
+                let mut round = ((t - end) / period).floor().max(0.0) + 1.0;
+                if !reached(end + shift(round - 1.0)) && round > 1.0 {
+                    round -= 1.0;
+                }
+                if reached(end + shift(round)) {
+                    round += 1.0;
+                }
+                let shift = shift(round);
+                let first = points.partition_point(|(time, _)| time < from);
+                // At `from` itself the later of two values holds, as after any jump.
+                let mut piece = between(&points[first..], &|corner| reached(corner + shift));
+                piece.shape = piece.shape.later(shift);
+                piece.start += shift;
+                piece.end += shift;
+                // Where the period is shorter than the rounding of t, still move on.
+                if !(piece.end > t || (left && piece.end >= t)) {
+                    piece.end = t.next_up();
+                }
+                piece
             }
             Waveform::Exponential { from, to, rise_delay, rise_tau, fall_delay, fall_tau } => {
                 let rise = Relaxation { by: to - from, after: *rise_delay, tau: *rise_tau };
@@ -201,6 +248,20 @@ impl Waveform {
     }
 }
 
+/// The line that holds at a time, of straight lines between points.
+fn between(points: &[(f64, f64)], reached: &dyn Fn(f64) -> bool) -> Segment {
+    let after = points.partition_point(|(time, _)| reached(*time));
+    let before = after.checked_sub(1).and_then(|k| points.get(k));
+    match (before, points.get(after)) {
+        (Some(&(t0, y0)), Some(&(t1, y1))) => {
+            Segment { start: t0, end: t1, shape: Shape::Line { t0, y0, t1, y1 } }
+        }
+        (None, Some(&(t1, y1))) => Segment::constant(f64::NEG_INFINITY, t1, y1),
+        (Some(&(t0, y0)), None) => Segment::constant(t0, f64::INFINITY, y0),
+        (None, None) => Segment::constant(f64::NEG_INFINITY, f64::INFINITY, 0.0),
+    }
+}
+
 /// A smooth piece of a waveform. It may be evaluated anywhere; it is the waveform from `start` to `end`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
@@ -217,6 +278,7 @@ enum Shape {
     Sine { offset: f64, amplitude: f64, omega: f64, phase: f64, damping: f64, delay: f64 },
     Relaxing { from: f64, parts: [Option<Relaxation>; 2] },
     Sffm { offset: f64, amplitude: f64, carrier: f64, index: f64, signal: f64 },
+    Am { amplitude: f64, offset: f64, signal: f64, carrier: f64, delay: f64 },
 }
 
 /// by·(1 − e^(−(t − after)/tau))
@@ -230,6 +292,14 @@ struct Relaxation {
 impl Shape {
     fn constant(value: f64) -> Shape {
         Shape::Line { t0: 0.0, y0: value, t1: 1.0, y1: value }
+    }
+
+    /// A line that comes later.
+    fn later(self, by: f64) -> Shape {
+        match self {
+            Shape::Line { t0, y0, t1, y1 } => Shape::Line { t0: t0 + by, y0, t1: t1 + by, y1 },
+            other => other,
+        }
     }
 }
 
@@ -265,6 +335,11 @@ impl Segment {
             Shape::Sffm { offset, amplitude, carrier, index, signal } => {
                 offset + amplitude * libm::sin(carrier * t + index * libm::sin(signal * t))
             }
+            Shape::Am { amplitude, offset, signal, carrier, delay } => {
+                let since = t - delay;
+                let envelope = offset + libm::sin(signal * since);
+                amplitude * envelope * libm::sin(carrier * since)
+            }
         }
     }
 
@@ -293,6 +368,12 @@ impl Segment {
             Shape::Sffm { amplitude, carrier, index, signal, .. } => {
                 let angle = carrier * t + index * libm::sin(signal * t);
                 amplitude * libm::cos(angle) * (carrier + index * signal * libm::cos(signal * t))
+            }
+            Shape::Am { amplitude, offset, signal, carrier, delay } => {
+                let since = t - delay;
+                let (sine, cosine) = libm::sincos(carrier * since);
+                let (low, low_cosine) = libm::sincos(signal * since);
+                amplitude * (signal * low_cosine * sine + carrier * (offset + low) * cosine)
             }
         }
     }
@@ -384,6 +465,22 @@ mod tests {
         assert_eq!(wave.corners(0.0, 9.0).collect::<Vec<_>>(), [1.0, 2.0]);
     }
 
+    #[test]
+    fn repeated_lines_go_on_from_where_they_are_told() {
+        let points = vec![(0.0, 1.0), (1.0, 2.0), (1.5, 0.0), (2.0, 3.0)];
+        let wave = Waveform::Repeating { points, from: 1.0, end: 2.0 };
+        assert_eq!((wave.value(0.5), wave.value(1.75)), (1.5, 1.5));
+        for round in 0..5 {
+            let t = f64::from(round);
+            assert_eq!(
+                (wave.value(2.0 + t), wave.value(2.25 + t), wave.value(2.75 + t)),
+                (2.0, 1.0, 1.5)
+            );
+            assert_eq!(wave.value_before(3.0 + t), 3.0);
+        }
+        assert_eq!(wave.corners(0.0, 3.6).collect::<Vec<_>>(), [1.0, 1.5, 2.0, 2.5, 3.0, 3.5]);
+    }
+
     proptest! {
         #[test]
         fn corners_lie_between_smooth_segments(
@@ -401,7 +498,7 @@ mod tests {
         }
 
         #[test]
-        fn slopes_agree_with_differences(which in 0..4usize, t in 0.01..3.0f64) {
+        fn slopes_agree_with_differences(which in 0..6usize, t in 0.01..3.0f64) {
             let wave = [
                 pulse(0.125, 0.25),
                 Waveform::Sine { offset: 0.1, amplitude: 2.0, frequency: 0.7, delay: 0.3, damping: 0.4, phase: 1.0 },
@@ -409,6 +506,8 @@ mod tests {
                     from: 0.0, to: 2.0, rise_delay: 0.2, rise_tau: 0.3, fall_delay: 1.0, fall_tau: 0.7,
                 },
                 Waveform::Sffm { offset: 0.5, amplitude: 1.5, carrier: 1.1, index: 2.0, signal: 0.3 },
+                Waveform::Am { amplitude: 1.5, offset: 0.4, signal: 0.3, carrier: 1.1, delay: 0.2 },
+                Waveform::Repeating { points: vec![(0.0, 1.0), (0.3, 2.0), (0.8, -1.0)], from: 0.3, end: 0.8 },
             ][which].clone();
             let piece = wave.segment(t);
             let h = 1e-5;

@@ -5,6 +5,7 @@ use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::expr;
 use crate::netlist::dialects::Dialect;
+use crate::netlist::parts::map_leaves;
 use crate::netlist::{Card, CardKind, Expr, Leaf, Names, Netlist, read};
 use crate::source::loader::edit_distance;
 use crate::source::{SourceMap, Span};
@@ -36,12 +37,13 @@ fn cards(
 /// An expression with the names of another netlist.
 fn adopt(expr: &Expr, from: &Names, to: &mut Names) -> Expr {
     let mut name = |name| to.intern(from.text(name));
-    expr.map(&mut |leaf, _| {
+    map_leaves(expr, &mut |leaf, _| {
         expr::Expr::leaf(match leaf {
             Leaf::Parameter(a) => Leaf::Parameter(name(*a)),
             Leaf::Voltage(a, b) => Leaf::Voltage(name(*a), b.map(&mut name)),
             Leaf::Current(a) => Leaf::Current(name(*a)),
-            Leaf::Time => Leaf::Time,
+            // What is within operators has been mapped.
+            Leaf::Time | Leaf::Operator(..) => leaf.clone(),
         })
     })
 }

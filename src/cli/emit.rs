@@ -6,7 +6,7 @@ use crate::bond::graph::{
     StoreInitial, StoreLaw, Variable,
 };
 use crate::circuit::stamps::{self, Stamps};
-use crate::circuit::{self, Circuit, DeviceKind, Waveform};
+use crate::circuit::{self, Circuit, DeviceKind, LawOf, Quantity, Waveform};
 use crate::expr::print::{number, print};
 use crate::expr::{Dialect, Expr};
 
@@ -247,9 +247,43 @@ pub fn circuit(circuit: &Circuit) -> String {
             DeviceKind::Hold { period, round } => {
                 format!("sample every {} s, round {round}", number(*period))
             }
-            DeviceKind::Diode { model, area } => {
-                format!("diode is={} area={}", number(model.saturation_current), number(*area))
-            }
+            DeviceKind::Diode { model, instance } => format!(
+                "diode is={} area={} at {} C",
+                number(model.saturation_current),
+                number(instance.area * instance.multiplicity),
+                number(instance.temperature)
+            ),
+            DeviceKind::BehaviouralResistor { law } => format!("v = ({}) i", text(law)),
+            DeviceKind::BehaviouralCapacitor { law, law_of, initial } => match law_of {
+                LawOf::Stored => format!("q = {}", text(law)) + &start(initial),
+                LawOf::Factor => format!("i = ({}) dv/dt", text(law)) + &start(initial),
+            },
+            DeviceKind::BehaviouralInductor { law, law_of, initial } => match law_of {
+                LawOf::Stored => format!("flux = {}", text(law)) + &start(initial),
+                LawOf::Factor => format!("v = ({}) di/dt", text(law)) + &start(initial),
+            },
+            DeviceKind::CrossedSwitch { control, above, below, .. } => format!(
+                "switch by {}: on from {} upward, off from {} downward",
+                text(control),
+                number(*below),
+                number(*above)
+            ),
+            DeviceKind::SmoothSwitch { control, on, off, .. } => format!(
+                "switch by {}: smoothly from off at {} to on at {}",
+                text(control),
+                number(*off),
+                number(*on)
+            ),
+            DeviceKind::Quantity(quantity) => match quantity {
+                Quantity::Derivative { law } => format!("d/dt of {}", text(law)),
+                Quantity::Integral { law, initial, .. } => {
+                    format!("integral of {} from {}", text(law), number(*initial))
+                }
+                Quantity::Delay { law, by } => {
+                    format!("{} delayed by {} s", text(law), number(*by))
+                }
+                Quantity::Signal { waveform } => self::waveform(waveform),
+            },
         };
         table.row([row.name.clone(), nodes.join(" "), value]);
     }

@@ -188,6 +188,7 @@ fn column(trace: &Trace, netlist: &Netlist, law: &netlist::Expr) -> Result<Vec<f
             }
             Leaf::Parameter(name) => return Err(netlist.names.text(*name).to_string()),
             Leaf::Time => [Some(trace.time()), None],
+            Leaf::Operator(..) => return Err("a value of the past".to_string()),
         });
         Ok(Expr::leaf(columns.len() - 1))
     })?;

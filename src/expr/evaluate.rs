@@ -3,7 +3,7 @@
 //! What each operator means is said here and in [`values`](super::values), once: IEEE arithmetic; comparisons
 //! and logic give 1 or 0, and whatever is not 0 is true; a power is real ([`power`]).
 
-use super::tree::{Binary, Expr, Node, Table, Unary};
+use super::tree::{Binary, Expr, Node, Unary};
 use super::values::power;
 
 impl<L> Expr<L> {
@@ -77,42 +77,13 @@ impl Binary {
     }
 }
 
-impl Table {
-    /// Linear interpolation that holds the end values; NaN for a table without points.
-    pub fn value(&self, x: f64) -> f64 {
-        match self.segment(x) {
-            Some(k) => {
-                let (x0, x1, y0, y1) = (self.x[k], self.x[k + 1], self.y[k], self.y[k + 1]);
-                y0 + (y1 - y0) * ((x - x0) / (x1 - x0))
-            }
-            None if x.is_nan() => x,
-            None if self.x.first().is_some_and(|first| x < *first) => self.y[0],
-            None => self.y.last().copied().unwrap_or(f64::NAN),
-        }
-    }
-
-    /// The slope; at a point the one to its right, outside 0.
-    pub fn slope(&self, x: f64) -> f64 {
-        match self.segment(x) {
-            Some(k) => (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k]),
-            None => x * 0.0,
-        }
-    }
-
-    /// The k with x[k] ≤ x < x[k+1].
-    fn segment(&self, x: f64) -> Option<usize> {
-        let above = self.x.partition_point(|knot| *knot <= x);
-        (above > 0 && above < self.x.len()).then(|| above - 1)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn tables_hold_their_end_values() {
-        let table = Table { x: vec![0.0, 1.0, 3.0], y: vec![2.0, 4.0, 0.0] };
+        let table = Table::lines(vec![0.0, 1.0, 3.0], vec![2.0, 4.0, 0.0]);
         let values: Vec<f64> =
             [-1.0, 0.0, 0.5, 1.0, 2.0, 3.0, 9.0].iter().map(|x| table.value(*x)).collect();
         assert_eq!(values, [2.0, 2.0, 3.0, 4.0, 2.0, 0.0, 0.0]);

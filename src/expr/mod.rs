@@ -4,6 +4,7 @@
 //! effort; a node's voltage), and going from one stage to the next is [`Expr::try_map`].
 
 pub mod tree;
+pub mod curves;
 pub mod values;
 pub mod functions;
 pub mod names;
@@ -19,6 +20,7 @@ pub mod print;
 mod tests;
 
 pub use crate::__expression_roles as roles;
+pub use curves::Curve;
 pub use dag::{Dag, NodeId};
 pub use functions::{Dialect, FUNCTIONS, Function};
 pub use program::Program;

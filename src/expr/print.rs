@@ -5,6 +5,7 @@
 //! through `exp` and `ln`; limits are `min(max())`; tables hold their ends by clamping the argument of `pwl`, which
 //! would extrapolate; numbers carry no suffix. Where spellings of one meaning differ, [`Dialect`] decides.
 
+use super::curves::Curve;
 use super::functions::{Dialect, Function, Slot, Spelling, Template};
 use super::tree::{Binary, Expr, Node, Table, Unary};
 
@@ -350,8 +351,53 @@ fn by_logarithm(base: &Piece, power: &Piece) -> Piece {
     Piece::atom(format!("exp({}*ln({}))", power.at(PRODUCT + 1), base.text))
 }
 
+/// A curve as a choice between its cells, halved again and again, each a polynomial.
+fn pieces(argument: &Piece, table: &Table, dialect: Dialect) -> Piece {
+    let cells = table.cells();
+    let (Some(first), Some(last)) = (table.x.first(), table.x.last()) else {
+        return Piece::number(f64::NAN);
+    };
+    let x = &argument.text;
+    // Beyond its ends it holds their values.
+    let held = format!("min(max({x},{}),{})", number(*first), number(*last));
+    fn between(
+        held: &str,
+        table: &Table,
+        cells: &[Vec<f64>],
+        from: usize,
+        dialect: Dialect,
+    ) -> Piece {
+        if let [cell] = cells {
+            let start = table.x[from];
+            let sign = if start < 0.0 { '+' } else { '-' };
+            let u = format!("({held}{sign}{})", number(start.abs()));
+            let sum = cell.iter().rev().fold(String::new(), |inner, factor| {
+                let factor = Piece::number(*factor).at(PRODUCT);
+                if inner.is_empty() { factor } else { format!("({factor}+{u}*{inner})") }
+            });
+            return Piece::atom(sum);
+        }
+        let middle = cells.len() / 2;
+        let limit = number(table.x[from + middle]);
+        let condition = match dialect {
+            Dialect::Bond => Piece::new(format!("{held} < {limit}"), COMPARISON),
+            _ => Piece::atom(format!("({held} < {limit})")),
+        };
+        let below = between(held, table, &cells[..middle], from, dialect);
+        let above = between(held, table, &cells[middle..], from + middle, dialect);
+        choice(&condition, &below, &above, dialect)
+    }
+    match cells.is_empty() {
+        true => Piece::number(table.y.first().copied().unwrap_or(f64::NAN)),
+        false => between(&held, table, &cells, 0, dialect),
+    }
+}
+
 fn interpolation(argument: &Piece, table: &Table, dialect: Dialect) -> Piece {
     let (between, after) = if dialect == Dialect::Bond { (", ", "; ") } else { (",", ",") };
+    if table.curve != Curve::Lines {
+        return pieces(argument, table, dialect);
+    }
     let points = table.x.iter().zip(&table.y);
     let rows: Vec<String> =
         points.map(|(x, y)| format!("{}{between}{}", number(*x), number(*y))).collect();

@@ -189,7 +189,7 @@ mod tests {
 
     /// Trees over inputs 0, 1, 2, of every operation and function.
     fn trees() -> impl Strategy<Value = Expr<u32>> {
-        let table = Arc::new(Table { x: vec![-1.0, 0.0, 2.0], y: vec![3.0, 1.0, 2.0] });
+        let table = Arc::new(Table::lines(vec![-1.0, 0.0, 2.0], vec![3.0, 1.0, 2.0]));
         let leaf = prop_oneof![
             (0..3u32).prop_map(Expr::leaf),
             prop_oneof![Just(0.0), Just(1.0), Just(-1.0), Just(2.0), Just(0.5), -3.0..3.0f64]

@@ -27,7 +27,7 @@ pub enum Node<L> {
     Call(super::functions::Function, Vec<Expr<L>>),
     /// `if c then a else b`; `c` is true when it is not 0.
     If(Expr<L>, Expr<L>, Expr<L>),
-    /// Linear interpolation that holds its end values.
+    /// Interpolation that holds its end values.
     Table(Expr<L>, Arc<Table>),
 }
 
@@ -60,13 +60,15 @@ pub enum Binary {
     Or,
 }
 
-/// Points of a piecewise linear function, x strictly increasing.
+/// Points that a curve passes through, x strictly increasing; beyond the ends it holds its end values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// Abscissae.
     pub x: Vec<f64>,
     /// Ordinates, as many.
     pub y: Vec<f64>,
+    /// How they are joined.
+    pub curve: super::curves::Curve,
 }
 
 /// What puts a tree in the place of each leaf.

@@ -4,7 +4,7 @@
 //! there are any (`adapt`), else it is an error that names the element.
 
 use super::adapt::{self, Adapted};
-use super::{Netlist, mast, write};
+use super::{Netlist, lacks, mast, write};
 use crate::diagnostic::Diagnostic;
 use crate::expr;
 
@@ -98,7 +98,17 @@ pub const NGSPICE: Dialect = Dialect {
     linked_to_any: true,
     phases: true,
     switches: Switches::Threshold,
-    lacks: &[],
+    lacks: &[
+        lacks::FLUX,
+        lacks::INTEGRAL,
+        lacks::DELAY,
+        lacks::TRANSFER,
+        lacks::WAVEFORM_CALL,
+        lacks::SOURCE_LAW,
+        lacks::PATTERN,
+        lacks::LAW_SWITCH,
+        lacks::SMOOTH_SWITCH,
+    ],
     text: Some(|netlist, dialect, _| Some(write::text(netlist, dialect))),
     read: Some(Reading {
         numbers: Numbers { atto: true, x_is_mega: false, digits_behind: false },
@@ -130,7 +140,16 @@ pub const DIALECTS: &[Dialect] = &[
         options: (Some("timeint"), &["newlte=3"]),
         linked_to_any: false,
         switches: Switches::Smooth,
-        lacks: &[adapt::CHARGED_LINE, adapt::SWITCHING_HYSTERESIS],
+        lacks: &[
+            adapt::CHARGED_LINE,
+            adapt::SWITCHING_HYSTERESIS,
+            lacks::INDUCTOR_LAW,
+            lacks::FLUX,
+            lacks::BEGUN_INTEGRAL,
+            lacks::DELAY,
+            lacks::TRANSFER,
+            lacks::AMPLITUDE,
+        ],
         read: Some(Reading {
             numbers: Numbers { atto: false, x_is_mega: true, digits_behind: false },
             comments: &[";"],
@@ -148,7 +167,21 @@ pub const DIALECTS: &[Dialect] = &[
         // Every point in double precision, none thinned out for plots.
         options: (None, &["numdgt=15", "plotwinsize=0"]),
         linked_to_any: false,
-        lacks: &[adapt::CHARGED_LINE],
+        lacks: &[
+            adapt::CHARGED_LINE,
+            lacks::CAPACITOR_LAW,
+            lacks::INDUCTOR_LAW,
+            lacks::CHARGE,
+            lacks::FLUX,
+            lacks::TRANSFER,
+            lacks::WAVEFORM_CALL,
+            lacks::SOURCE_LAW,
+            lacks::REPEATED,
+            lacks::PATTERN,
+            lacks::AMPLITUDE,
+            lacks::LAW_SWITCH,
+            lacks::SMOOTH_SWITCH,
+        ],
         read: Some(Reading {
             numbers: Numbers { atto: false, x_is_mega: false, digits_behind: true },
             comments: &[";"],
@@ -166,7 +199,20 @@ pub const DIALECTS: &[Dialect] = &[
         options: (None, &["short=1e-9", "gmin=1e-20", "abstol=1e-18", "chgtol=1e-25", "numdgt=9"]),
         linked_to_any: false,
         phases: false,
-        lacks: &[adapt::LAW, adapt::SWITCH, adapt::DIODE, adapt::PHASE, adapt::CHARGED_LINE],
+        lacks: &[
+            adapt::LAW,
+            adapt::SWITCH,
+            adapt::DIODE,
+            adapt::PHASE,
+            adapt::CHARGED_LINE,
+            lacks::PASSIVE_LAW,
+            lacks::MODELLED,
+            lacks::SOURCE_LAW,
+            lacks::REPEATED,
+            lacks::PATTERN,
+            lacks::AMPLITUDE,
+            lacks::LAW_SWITCH,
+        ],
         ..NGSPICE
     },
     Dialect {

@@ -2,17 +2,20 @@
 
 pub mod names;
 pub mod visit;
+pub mod parts;
 pub mod header;
 pub mod read;
 pub mod write;
 pub mod flatten;
 pub mod dialects;
 pub mod adapt;
+pub mod lacks;
 pub mod mast;
 
 use crate::expr;
 use crate::source::Span;
 pub use names::{Name, Names};
+pub use parts::{Operator, Passive, PassiveKind};
 
 /// An expression of a netlist.
 pub type Expr = expr::Expr<Leaf>;
@@ -28,6 +31,8 @@ pub enum Leaf {
     Current(Name),
     /// Time in seconds.
     Time,
+    /// What follows from values over time.
+    Operator(Operator, Vec<Expr>),
 }
 
 /// A card and the place that it came from: its line in the netlist, or in the `.bg` file for one that was translated.
@@ -166,6 +171,18 @@ pub enum Element {
         value: Expr,
         initial: Option<Expr>,
     },
+    /// An R, C or L with a model or further parameters.
+    Passive(Box<Passive>),
+    /// A capacitor by its charge.
+    Charge {
+        law: Expr,
+        initial: Option<Expr>,
+    },
+    /// An inductor by its flux.
+    Flux {
+        law: Expr,
+        initial: Option<Expr>,
+    },
     Mutual {
         inductors: Vec<Name>,
         coupling: Expr,
@@ -213,9 +230,17 @@ pub enum Element {
         control: Name,
         on: Option<bool>,
     },
+    /// `S n+ n- model CONTROL={expression}`.
+    LawSwitch {
+        model: Name,
+        control: Expr,
+        on: Option<bool>,
+    },
+    /// `area` beside, its parameters are folded to lower case.
     Diode {
         model: Name,
         area: Option<Expr>,
+        parameters: Vec<(String, Expr)>,
     },
     Instance {
         subcircuit: Name,
@@ -253,6 +278,24 @@ pub enum Waveform {
         /// Its arguments in order.
         arguments: Vec<Expr>,
     },
+    /// `PWL( … ) R=… TD=…`: points that are repeated, or come later.
+    Points {
+        /// Times and values in turn.
+        points: Vec<Expr>,
+        /// The time that it goes on from when it has come to its end.
+        repeat: Option<Expr>,
+        /// How much later everything is.
+        delay: Option<Expr>,
+    },
+    /// `PAT(high low delay rise fall sample bits)`.
+    Pattern {
+        /// Its first six arguments.
+        arguments: Vec<Expr>,
+        /// Noughts and ones.
+        bits: String,
+        /// How often it is repeated; for ever where negative.
+        repeat: Option<Expr>,
+    },
 }
 
 /// Waveform functions of SPICE.
@@ -264,6 +307,7 @@ pub enum Shape {
     Pwl,
     Exp,
     Sffm,
+    Am,
 }
 
 /// A netlist.

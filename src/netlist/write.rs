@@ -5,6 +5,7 @@
 //! comment stands at the end of its line where there is room, else on a line above.
 
 use super::dialects::{Comments, Dialect, NGSPICE};
+use super::parts::{Operator, varies};
 use super::{
     Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Source, Waveform, read,
 };
@@ -30,6 +31,21 @@ struct Form<'a> {
 }
 
 impl Form<'_> {
+    /// A call of an operator. One that the dialect lacks has been refused.
+    fn operator(&self, operator: Operator, arguments: &[Expr]) -> String {
+        let name = match operator {
+            Operator::Derivative => "ddt".to_string(),
+            // Of two arguments where it does not begin at 0.
+            Operator::Integral if arguments.len() > 1 => "idt".to_string(),
+            Operator::Integral => "sdt".to_string(),
+            Operator::Delay => "delay".to_string(),
+            Operator::Transfer => "laplace".to_string(),
+            Operator::Waveform(shape) => format!("spice_{}", read::waveforms::row(shape).name),
+        };
+        let arguments: Vec<String> = arguments.iter().map(|a| self.expression(a)).collect();
+        format!("{name}({})", arguments.join(","))
+    }
+
     fn name(&self, name: Name) -> String {
         self.names.text(name).to_string()
     }
@@ -43,6 +59,7 @@ impl Form<'_> {
             }
             Leaf::Current(device) => format!("i({})", self.name(*device)),
             Leaf::Time => "time".to_string(),
+            Leaf::Operator(operator, arguments) => self.operator(*operator, arguments),
         })
     }
 }
@@ -186,11 +203,29 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
     };
     let state = |on: &Option<bool>| on.map(|on| if on { "ON" } else { "OFF" }.to_string());
     match &device.element {
-        Element::Resistor { value: resistance } => words.push(value(form, resistance)),
-        Element::Capacitor { value: size, initial: ic }
-        | Element::Inductor { value: size, initial: ic } => {
-            words.push(value(form, size));
+        Element::Resistor { value } => words.push(size(form, "R", value)),
+        Element::Capacitor { value, initial: ic } => {
+            words.push(size(form, "C", value));
             words.extend(initial(ic));
+        }
+        Element::Inductor { value, initial: ic } => {
+            words.push(size(form, "L", value));
+            words.extend(initial(ic));
+        }
+        Element::Charge { law, initial: ic } => {
+            words.push(format!("Q={{{}}}", breakable(&form.expression(law))));
+            words.extend(initial(ic));
+        }
+        Element::Flux { law, initial: ic } => {
+            words.push(format!("Flux={{{}}}", breakable(&form.expression(law))));
+            words.extend(initial(ic));
+        }
+        Element::Passive(passive) => {
+            let letter = passive.kind.model().to_uppercase();
+            words.extend(passive.value.as_ref().map(|value| size(form, &letter, value)));
+            words.extend(passive.model.as_ref().map(name));
+            words.extend(keyed(form, &passive.parameters));
+            words.extend(initial(&passive.initial));
         }
         Element::Mutual { inductors, coupling } => {
             words.extend(inductors.iter().map(name));
@@ -226,9 +261,15 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
             words.extend([name(control), name(model)]);
             words.extend(state(on));
         }
-        Element::Diode { model, area } => {
+        Element::LawSwitch { model, control, on } => {
+            words.push(name(model));
+            words.extend(state(on));
+            words.push(format!("CONTROL={{{}}}", breakable(&form.expression(control))));
+        }
+        Element::Diode { model, area, parameters } => {
             words.push(name(model));
             words.extend(area.as_ref().map(|area| value(form, area)));
+            words.extend(keyed(form, parameters));
         }
         Element::Instance { subcircuit, parameters } => {
             words.push(name(subcircuit));
@@ -245,25 +286,61 @@ fn source_words(form: Form, source: &Source) -> Vec<String> {
         (Some(dc), _) => words.extend(["DC".to_string(), value(form, dc)]),
         // What stands before `AC` is read as the value, with or without a word for it.
         (None, Waveform::Constant(constant)) => words.push(value(form, constant)),
-        (None, Waveform::Function { .. }) => {}
+        (None, _) => {}
     }
     if let Some([magnitude, phase]) = &source.ac {
         words.extend(["AC".to_string(), value(form, magnitude), value(form, phase)]);
     }
-    if let Waveform::Function { shape, arguments } = &source.waveform {
-        let shape = read::waveforms::row(*shape).name.to_uppercase();
-        let mut arguments: Vec<String> =
-            arguments.iter().map(|argument| value(form, argument)).collect();
-        match arguments.first_mut() {
-            Some(first) => *first = format!("{shape}({first}"),
-            None => arguments.push(format!("{shape}(")),
+    let numbers = |arguments: &[Expr]| -> Vec<String> {
+        arguments.iter().map(|argument| value(form, argument)).collect()
+    };
+    let option = |key: &str, expr: &Option<Expr>| {
+        expr.as_ref().map(|expr| format!("{key}={}", value(form, expr)))
+    };
+    match &source.waveform {
+        Waveform::Constant(_) => {}
+        Waveform::Function { shape, arguments } => {
+            let name = read::waveforms::row(*shape).name.to_uppercase();
+            words.extend(called(&name, numbers(arguments)));
         }
-        if let Some(last) = arguments.last_mut() {
-            last.push(')');
+        Waveform::Points { points, repeat, delay } => {
+            words.extend(called("PWL", numbers(points)));
+            words.extend(option("R", repeat));
+            words.extend(option("TD", delay));
         }
-        words.extend(arguments);
+        Waveform::Pattern { arguments, bits, repeat } => {
+            let mut arguments = numbers(arguments);
+            arguments.push(format!("b{bits}"));
+            words.extend(called("PAT", arguments));
+            words.extend(option("R", repeat));
+        }
     }
     words
+}
+
+/// `NAME(a b c)`, word by word.
+fn called(name: &str, mut arguments: Vec<String>) -> Vec<String> {
+    match arguments.first_mut() {
+        Some(first) => *first = format!("{name}({first}"),
+        None => arguments.push(format!("{name}(")),
+    }
+    if let Some(last) = arguments.last_mut() {
+        last.push(')');
+    }
+    arguments
+}
+
+/// The value of an R, C or L: a law after its letter, a number as it stands.
+fn size(form: Form, letter: &str, expr: &Expr) -> String {
+    match varies(expr) {
+        true => format!("{letter}={{{}}}", breakable(&form.expression(expr))),
+        false => value(form, expr),
+    }
+}
+
+/// `key=value` of parameters.
+fn keyed(form: Form, parameters: &[(String, Expr)]) -> Vec<String> {
+    parameters.iter().map(|(key, expr)| format!("{key}={}", value(form, expr))).collect()
 }
 
 fn assignments(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {

@@ -1,11 +1,11 @@
 //! Runs against closed forms, orders of convergence, and what goes wrong.
 
 use super::*;
-use crate::circuit::Parts;
 use crate::circuit::stamps::{Stamps, stamp};
 use crate::circuit::{
     Circuit, Device, DeviceId, DeviceKind, DiodeModel, Expr, Leaf, Node, NodeId, Waveform,
 };
+use crate::circuit::{DiodeInstance, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Function};
 use crate::source::Span;
@@ -309,6 +309,7 @@ fn orders_of_convergence_with_a_charge_that_is_not_linear() {
         }],
         nodes: 1,
         charges: vec![Charge {
+            pinned: false,
             device: DeviceId(0),
             linear: vec![(UnknownId(0), 1.0)],
             law: Some(mul(v(), mul(v(), v()))),
@@ -404,18 +405,11 @@ fn the_operating_point_of_a_diode() {
     let model = DiodeModel {
         saturation_current: 1e-12,
         emission: thermal / crate::circuit::devices::diode::THERMAL_VOLTAGE,
-        series_resistance: 0.0,
-        junction_capacitance: 0.0,
-        junction_potential: 1.0,
-        grading: 0.5,
-        transit_time: 0.0,
-        forward_bias_depletion: 0.5,
-        breakdown_voltage: None,
-        breakdown_current: 1e-3,
+        ..DiodeModel::DEFAULT
     };
     let exponential = call(Function::Exp, times(volt(2, 0), Expr::number(1.0 / thermal)));
     let law = times(Expr::number(1e-12), plus(exponential, Expr::number(-1.0)));
-    let diode = DeviceKind::Diode { model, area: 1.0 };
+    let diode = DeviceKind::Diode { model, instance: DiodeInstance::default() };
     for (name, device) in [("D1", diode), ("B1", DeviceKind::BehaviouralCurrent { law })] {
         let system = system(vec![
             ("V1", vec![1, 0], dc(1.0)),

@@ -390,7 +390,8 @@ impl Check<'_> {
                     std::iter::once(*a).chain(*b).map(|node| netlist::Leaf::Voltage(node, None)),
                 ),
                 netlist::Leaf::Current(_) => wanted.push(leaf.clone()),
-                netlist::Leaf::Parameter(_) | netlist::Leaf::Time => {}
+                netlist::Leaf::Parameter(_) | netlist::Leaf::Time | netlist::Leaf::Operator(..) => {
+                }
             });
             for leaf in wanted {
                 for (print, card) in [(0, ".save"), (1, ".print")] {

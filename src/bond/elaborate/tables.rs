@@ -114,7 +114,7 @@ impl Scope<'_> {
         span: Span,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Arc<Table>> {
-        let mut table = Table { x: vec![], y: vec![] };
+        let mut table = Table::lines(vec![], vec![]);
         let mut failed = rows.is_empty();
         for row in rows {
             let [x, y] = row.as_slice() else {
@@ -224,7 +224,7 @@ fn read_points(
         Diagnostic::error("E0252", span, message)
             .help("a table's file holds two columns of numbers in SI, separated by commas")
     };
-    let mut table = Table { x: vec![], y: vec![] };
+    let mut table = Table::lines(vec![], vec![]);
     let mut factors = [1.0, 1.0];
     let mut units = [None, None];
     let mut first = true;

@@ -1,30 +1,42 @@
-//! Junction diode, level 1 of SPICE3, at 27 °C, without a gmin of its own.
+//! Junction diode: level 1 of SPICE3 with the sidewall, high injection and recombination of later simulators, without a
+//! gmin of its own.
 //!
 //! ```text
-//! Vt = k·T/q, T = 300.15 K                                   (i, q scale with the area, Rs by its reciprocal)
-//! v ≥ −3·N·Vt        i = Is·(e^(v/(N·Vt)) − 1)
+//! Vt = k·T/q
+//! v ≥ −3·N·Vt        i = Is·(e^(v/(N·Vt)) − 1)               lessened by high injection, see `Knee`
 //! −BV ≤ v < −3·N·Vt  i = −Is·(1 + (3·N·Vt/(e·v))³)
-//! v < −BV'           i = −Is·e^(−(BV' + v)/(N·Vt))           BV' such that i(−BV) = −IBV
+//! v < −BV'           i = −Is·e^(−(BV' + v)/(NBV·Vt))         BV' such that i(−BV) = −IBV
+//! besides            i = ISR·(e^(v/(NR·Vt)) − 1)·((1 − v/Vj)² + 0.005)^(M/2)
 //! v < FC·Vj          q = TT·i + Cjo·Vj/(1 − M)·(1 − (1 − v/Vj)^(1 − M))
 //! v ≥ FC·Vj          q = TT·i + Cjo·(F1 + (F3·(v − FC·Vj) + M/(2·Vj)·(v² − (FC·Vj)²))/F2)
 //! F1 = Vj/(1 − M)·(1 − (1 − FC)^(1 − M)), F2 = (1 − FC)^(1 + M), F3 = 1 − FC·(1 + M)
 //! ```
 //!
-//! v is across the junction; a series resistance Rs stands between the anode and an internal node. The middle region
-//! is what SPICE3 has instead of the exponential far below zero; it joins with equal slope.
+//! Is is that of the area and of the perimeter (JSW) together; i and q scale with area and number, Rs by their reciprocals;
+//! the charge of the sidewall has Cjsw, PHP, Mjsw and FCS in the places of Cjo, Vj, M and FC. v is across the junction; a
+//! series resistance Rs stands between the anode and an internal node. The middle region is what SPICE3 has instead of
+//! the exponential far below zero; it joins with equal slope. What temperature does to the parameters is told in
+//! `diode/temperature.rs`.
 //!
 //! Source: T. Quarles, The SPICE3 implementation guide, UCB/ERL M89/44, 1989; P. Antognetti, G. Massobrio,
-//! Semiconductor Device Modeling with SPICE, 1988, chapter 1.
+//! Semiconductor Device Modeling with SPICE, 1988, chapter 1; ngspice manual, version 39, section 7; PSpice Reference Guide,
+//! diode (recombination, knee).
+
+mod temperature;
 
 use super::{Needs, Row};
 use crate::circuit::stamper::{Current, Stamper, voltage};
 use crate::circuit::stamps::{Junction, Law, LawStamp, Leaf, UnknownId};
-use crate::circuit::{DeviceId, DeviceKind, DiodeModel};
+use crate::circuit::{DeviceId, DeviceKind, DiodeInstance, DiodeModel, Knee};
 use crate::expr::{Binary, Function, Node};
 use crate::source::Span;
+use temperature::Diode;
 
-/// Boltzmann's constant times 300.15 K over the elementary charge (both exact in the SI of 2019), in V.
-pub const THERMAL_VOLTAGE: f64 = 1.380649e-23 / 1.602176634e-19 * 300.15;
+/// Boltzmann's constant over the elementary charge (both exact in the SI of 2019), in V/K.
+pub const BOLTZMANN_OVER_CHARGE: f64 = 1.380649e-23 / 1.602176634e-19;
+
+/// Vt at 27 °C, in V.
+pub const THERMAL_VOLTAGE: f64 = BOLTZMANN_OVER_CHARGE * 300.15;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -32,9 +44,11 @@ pub const ROW: Row = Row {
     letters: "D",
     equation: "i = Is (exp(v/(N Vt)) - 1) + dq/dt",
     needs: |kind| match kind {
-        DeviceKind::Diode { model, .. } => Needs {
+        DeviceKind::Diode { model, instance } => Needs {
             internal: model.series_resistance != 0.0,
-            charge: model.junction_capacitance != 0.0 || model.transit_time != 0.0,
+            charge: model.junction_capacitance != 0.0
+                || model.transit_time != 0.0
+                || model.sidewall_capacitance * instance.perimeter != 0.0,
             ..Needs::NOTHING
         },
         _ => Needs::NOTHING,
@@ -44,27 +58,27 @@ pub const ROW: Row = Row {
 };
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
-    let DeviceKind::Diode { model, area } = stamper.device(id).kind else { return };
-    if !plausible(stamper, id, &model, area) {
+    let DeviceKind::Diode { model, instance } = &stamper.device(id).kind else { return };
+    if !plausible(stamper, id, model, instance) {
         return;
     }
+    let diode = Diode::at(model, instance);
     let [anode, cathode] = stamper.ends(id);
     let across = junction(stamper, id);
     if let Some(internal) = stamper.internal(id) {
-        let conductance = area / model.series_resistance;
+        let conductance = 1.0 / diode.resistance;
         stamper.difference(anode, [anode, Some(internal)], conductance);
         stamper.difference(Some(internal), [Some(internal), anode], conductance);
     }
     let into = stamper.leaving([across[0], cathode]);
-    let thermal = model.emission * THERMAL_VOLTAGE;
-    let critical =
-        thermal * (thermal / (std::f64::consts::SQRT_2 * model.saturation_current * area)).ln();
-    let law = conduction(&model, area, across);
+    let thermal = diode.thermal;
+    let critical = thermal * (thermal / (std::f64::consts::SQRT_2 * diode.saturation)).ln();
+    let law = conduction(&diode, across);
     if !into.is_empty() {
         let junction = Some(Junction { across, thermal, critical });
         stamper.stamps.laws.push(LawStamp { device: id, law, into: into.clone(), junction });
     }
-    let stored = storage(&model, area, across);
+    let stored = storage(&diode, across);
     if let Some(charge) = stamper.charge_mut(id) {
         charge.law = Some(stored);
         charge.into = into;
@@ -72,10 +86,10 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 }
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
-    let DeviceKind::Diode { model, area } = stamper.device(id).kind else {
+    let DeviceKind::Diode { model, instance } = &stamper.device(id).kind else {
         return Current::Linear(vec![]);
     };
-    let conducted = conduction(&model, area, junction(stamper, id));
+    let conducted = conduction(&Diode::at(model, instance), junction(stamper, id));
     Current::Law(match stamper.charge(id) {
         Some(charge) => conducted.binary(Binary::Add, Law::leaf(Leaf::Rate(charge))),
         None => conducted,
@@ -88,43 +102,56 @@ fn junction(stamper: &Stamper, id: DeviceId) -> [Option<UnknownId>; 2] {
     [stamper.internal(id).or(anode), cathode]
 }
 
-fn plausible(stamper: &mut Stamper, id: DeviceId, model: &DiodeModel, area: f64) -> bool {
+fn plausible(stamper: &mut Stamper, id: DeviceId, model: &DiodeModel, own: &DiodeInstance) -> bool {
     let positive = [
         ("Is", model.saturation_current),
         ("N", model.emission),
         ("Vj", model.junction_potential),
-        ("area", area),
+        ("area", own.area),
         ("IBV", model.breakdown_current),
         ("BV", model.breakdown_voltage.unwrap_or(1.0)),
+        ("NBV", model.breakdown_emission.unwrap_or(1.0)),
+        ("NR", model.recombination_emission),
+        ("IKF", model.knee.map_or(1.0, |(knee, _)| knee)),
+        ("EG", model.energy_gap),
+        ("PHP", model.sidewall_potential),
+        ("M=, the number,", own.multiplicity),
+        ("the temperature in K", own.temperature + temperature::CELSIUS),
+        ("TNOM in K", model.nominal_temperature + temperature::CELSIUS),
+    ];
+    let parts = [
+        ("M", model.grading),
+        ("FC", model.forward_bias_depletion),
+        ("MJSW", model.sidewall_grading),
+        ("FCS", model.sidewall_depletion),
     ];
     let others = [
         ("Rs", model.series_resistance),
         ("Cjo", model.junction_capacitance),
         ("TT", model.transit_time),
-        ("M", model.grading),
-        ("FC", model.forward_bias_depletion),
+        ("XTI", model.saturation_exponent),
+        ("ISR", model.recombination_current),
+        ("JSW", model.sidewall_current),
+        ("CJSW", model.sidewall_capacitance),
+        ("PJ", own.perimeter),
     ];
-    if !stamper.finite(id, &positive) || !stamper.finite(id, &others) {
+    if !(stamper.finite(id, &positive) && stamper.finite(id, &parts) && stamper.finite(id, &others))
+    {
         return false;
     }
     let name = &stamper.device(id).name;
     if let Some((what, value)) = positive.iter().find(|(_, value)| *value <= 0.0) {
+        let message = format!("{what} of the diode `{name}` is {value}, but must be above 0");
+        stamper.error("E0753", id, message);
+        return false;
+    }
+    if let Some((what, value)) = parts.iter().find(|(_, value)| !(0.0..1.0).contains(value)) {
         stamper.error(
             "E0753",
             id,
-            format!("{what} of the diode `{name}` is {value}, but must be above 0"),
+            format!("{what} of the diode `{name}` is {value}, outside 0 to 1"),
         );
         return false;
-    }
-    for (what, value) in &others[3..] {
-        if !(0.0..1.0).contains(value) {
-            stamper.error(
-                "E0753",
-                id,
-                format!("{what} of the diode `{name}` is {value}, outside 0 to 1"),
-            );
-            return false;
-        }
     }
     true
 }
@@ -146,49 +173,68 @@ fn below(v: Law, limit: f64, a: Law, b: Law) -> Law {
     Law::new(Node::If(v.binary(Binary::Less, number(limit)), a, b), Span::NONE)
 }
 
+/// factor·(e^(v/thermal) − 1)
+fn exponential(v: Law, factor: f64, thermal: f64) -> Law {
+    let power = Law::call(Function::Exp, vec![times(v, number(1.0 / thermal))]);
+    times(number(factor), add(power, number(-1.0)))
+}
+
 /// The current through the junction.
-fn conduction(model: &DiodeModel, area: f64, across: [Option<UnknownId>; 2]) -> Law {
+fn conduction(diode: &Diode, across: [Option<UnknownId>; 2]) -> Law {
     let v = || voltage(across);
-    let saturation = model.saturation_current * area;
-    let thermal = model.emission * THERMAL_VOLTAGE;
-    let exp = |argument| Law::call(Function::Exp, vec![argument]);
-    let forward =
-        times(number(saturation), add(exp(times(v(), number(1.0 / thermal))), number(-1.0)));
+    let (saturation, thermal) = (diode.saturation, diode.thermal);
+    let mut forward = exponential(v(), saturation, thermal);
+    if let Some((knee, law)) = diode.knee {
+        // Below zero nothing is lessened.
+        let current =
+            || Law::call(Function::Max, vec![exponential(v(), saturation, thermal), number(0.0)]);
+        let root = |law| Law::call(Function::Sqrt, vec![law]);
+        // A trifle keeps the slope of the root finite at zero current.
+        let trifle = 1e-18;
+        forward = match law {
+            Knee::Quotient => {
+                let part = add(times(current(), number(1.0 / knee)), number(trifle));
+                forward.binary(Binary::Divide, add(number(1.0), root(part)))
+            }
+            Knee::Root => {
+                let part = number(knee).binary(Binary::Divide, add(number(knee), current()));
+                times(forward, root(part))
+            }
+        };
+    }
     let ratio = || number(3.0 * thermal / std::f64::consts::E).binary(Binary::Divide, v());
     let cube = times(times(ratio(), ratio()), ratio());
     let mut reverse = times(number(-saturation), add(number(1.0), cube));
-    if let Some(breakdown) = model.breakdown_voltage {
-        let breakdown = matched_breakdown(
-            breakdown,
-            model.breakdown_current / model.saturation_current,
-            thermal,
-        );
-        let argument = times(add(v(), number(breakdown)), number(-1.0 / thermal));
-        reverse = below(v(), -breakdown, times(number(-saturation), exp(argument)), reverse);
+    if let Some(breakdown) = diode.breakdown {
+        let argument = times(add(v(), number(breakdown)), number(-1.0 / diode.breakdown_thermal));
+        let steep = Law::call(Function::Exp, vec![argument]);
+        reverse = below(v(), -breakdown, times(number(-saturation), steep), reverse);
     }
-    below(v(), -3.0 * thermal, reverse, forward)
+    let conducted = below(v(), -3.0 * thermal, reverse, forward);
+    if diode.recombination == 0.0 {
+        return conducted;
+    }
+    let base = add(number(1.0), times(v(), number(-1.0 / diode.depletion.potential)));
+    let square = add(times(base.clone(), base), number(0.005));
+    let width =
+        Law::call(Function::PowerOfAbs, vec![square, number(0.5 * diode.depletion.grading)]);
+    let own = exponential(v(), diode.recombination, diode.recombination_thermal);
+    add(conducted, times(own, width))
 }
 
-/// BV' of the header: the voltage whose exponential gives IBV at −BV, by the fixed point of SPICE3.
-fn matched_breakdown(breakdown: f64, current: f64, thermal: f64) -> f64 {
-    if current < breakdown / thermal {
-        // The leakage alone is more than IBV there: SPICE3 then takes BV as it stands.
-        return breakdown;
-    }
-    let mut matched = breakdown - thermal * (1.0 + current).ln();
-    for _ in 0..25 {
-        matched = breakdown - thermal * (current + 1.0 - matched / thermal).ln();
-    }
-    if matched.is_finite() { matched } else { breakdown }
+/// A depletion layer: what its charge follows from.
+#[derive(Clone, Copy, Debug)]
+struct Depletion {
+    capacitance: f64,
+    potential: f64,
+    grading: f64,
+    forward: f64,
 }
 
-/// The charge of the junction.
-fn storage(model: &DiodeModel, area: f64, across: [Option<UnknownId>; 2]) -> Law {
-    let v = || voltage(across);
-    let (vj, m, fc) = (model.junction_potential, model.grading, model.forward_bias_depletion);
-    let cj = model.junction_capacitance * area;
-    let mut terms = vec![];
-    if cj != 0.0 {
+impl Depletion {
+    /// Its charge at a voltage.
+    fn charge(&self, v: &dyn Fn() -> Law) -> Law {
+        let Depletion { capacitance: cj, potential: vj, grading: m, forward: fc } = *self;
         let base = add(number(1.0), times(v(), number(-1.0 / vj)));
         // The base is positive where this branch counts; elsewhere |base| keeps it a number.
         let power = Law::call(Function::PowerOfAbs, vec![base, number(1.0 - m)]);
@@ -196,17 +242,23 @@ fn storage(model: &DiodeModel, area: f64, across: [Option<UnknownId>; 2]) -> Law
         let (limit, f2, f3) = (fc * vj, (1.0 - fc).powf(1.0 + m), 1.0 - fc * (1.0 + m));
         let f1 = vj / (1.0 - m) * (1.0 - (1.0 - fc).powf(1.0 - m));
         let constant = cj * (f1 - (f3 * limit + m / (2.0 * vj) * limit * limit) / f2);
-        let forward = add(
-            number(constant),
-            add(
-                times(number(cj * f3 / f2), v()),
-                times(number(cj * m / (2.0 * vj * f2)), times(v(), v())),
-            ),
-        );
-        terms.push(below(v(), limit, depleted, forward));
+        let linear = times(number(cj * f3 / f2), v());
+        let quadratic = times(number(cj * m / (2.0 * vj * f2)), times(v(), v()));
+        below(v(), limit, depleted, add(number(constant), add(linear, quadratic)))
     }
-    if model.transit_time != 0.0 {
-        terms.push(times(number(model.transit_time), conduction(model, area, across)));
+}
+
+/// The charge of the junction.
+fn storage(diode: &Diode, across: [Option<UnknownId>; 2]) -> Law {
+    let v = || voltage(across);
+    let layers = [diode.depletion, diode.sidewall];
+    let mut terms: Vec<Law> = layers
+        .iter()
+        .filter(|layer| layer.capacitance != 0.0)
+        .map(|layer| layer.charge(&v))
+        .collect();
+    if diode.transit_time != 0.0 {
+        terms.push(times(number(diode.transit_time), conduction(diode, across)));
     }
     terms.into_iter().reduce(add).unwrap_or(number(0.0))
 }
@@ -216,21 +268,11 @@ mod tests {
     use super::*;
     use crate::circuit::devices::testing::*;
 
-    const MODEL: DiodeModel = DiodeModel {
-        saturation_current: 1e-14,
-        emission: 1.0,
-        series_resistance: 0.0,
-        junction_capacitance: 0.0,
-        junction_potential: 1.0,
-        grading: 0.5,
-        transit_time: 0.0,
-        forward_bias_depletion: 0.5,
-        breakdown_voltage: None,
-        breakdown_current: 1e-3,
-    };
+    const MODEL: DiodeModel = DiodeModel::DEFAULT;
 
     fn diode(model: DiodeModel, area: f64) -> crate::circuit::stamps::Stamps {
-        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model, area })])
+        let instance = DiodeInstance { area, ..DiodeInstance::default() };
+        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model, instance })])
     }
 
     fn at(law: &Law, v: f64) -> f64 {
@@ -310,7 +352,8 @@ mod tests {
             DiodeModel { emission: -1.0, ..MODEL },
             DiodeModel { grading: 1.0, ..MODEL },
         ] {
-            let circuit = circuit(vec![("d1", vec![1, 0], DeviceKind::Diode { model, area: 1.0 })]);
+            let instance = DiodeInstance::default();
+            let circuit = circuit(vec![("d1", vec![1, 0], DeviceKind::Diode { model, instance })]);
             let mut diagnostics = vec![];
             assert!(crate::circuit::stamps::stamp(&circuit, &mut diagnostics).is_none());
             assert_eq!(diagnostics[0].code, "E0753");

@@ -16,13 +16,20 @@ pub mod cccs;
 pub mod ccvs;
 pub mod behavioural_voltage;
 pub mod behavioural_current;
+pub mod behavioural_resistor;
+pub mod behavioural_capacitor;
+pub mod behavioural_inductor;
 pub mod switch;
+pub mod crossed_switch;
+pub mod smooth_switch;
 pub mod line;
 pub mod hold;
+pub mod quantity;
 pub mod diode;
 
 use super::stamper::{Current, Stamper};
-use super::{DeviceId, DeviceKind};
+use super::{DeviceId, DeviceKind, Leaf};
+use crate::diagnostic::Diagnostic;
 
 /// Whether a device has its current as an unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,12 +54,20 @@ pub struct Needs {
     pub mode: bool,
     /// A second branch.
     pub second: bool,
+    /// Unknowns that no output shows unasked, at most 2.
+    pub hidden: usize,
 }
 
 impl Needs {
     /// Nothing.
-    pub const NOTHING: Needs =
-        Needs { branch: Branch::Never, internal: false, charge: false, mode: false, second: false };
+    pub const NOTHING: Needs = Needs {
+        branch: Branch::Never,
+        internal: false,
+        charge: false,
+        mode: false,
+        second: false,
+        hidden: 0,
+    };
     /// A branch.
     pub const BRANCH: Needs = Needs { branch: Branch::Always, ..Needs::NOTHING };
 }
@@ -88,9 +103,15 @@ pub const DEVICES: &[Row] = &[
     ccvs::ROW,
     behavioural_voltage::ROW,
     behavioural_current::ROW,
+    behavioural_resistor::ROW,
+    behavioural_capacitor::ROW,
+    behavioural_inductor::ROW,
     switch::ROW,
+    crossed_switch::ROW,
+    smooth_switch::ROW,
     line::ROW,
     hold::ROW,
+    quantity::ROW,
     diode::ROW,
 ];
 
@@ -109,9 +130,15 @@ pub fn row(kind: &DeviceKind) -> &'static Row {
         DeviceKind::Ccvs { .. } => &ccvs::ROW,
         DeviceKind::BehaviouralVoltage { .. } => &behavioural_voltage::ROW,
         DeviceKind::BehaviouralCurrent { .. } => &behavioural_current::ROW,
+        DeviceKind::BehaviouralResistor { .. } => &behavioural_resistor::ROW,
+        DeviceKind::BehaviouralCapacitor { .. } => &behavioural_capacitor::ROW,
+        DeviceKind::BehaviouralInductor { .. } => &behavioural_inductor::ROW,
         DeviceKind::Switch { .. } => &switch::ROW,
+        DeviceKind::CrossedSwitch { .. } => &crossed_switch::ROW,
+        DeviceKind::SmoothSwitch { .. } => &smooth_switch::ROW,
         DeviceKind::Line { .. } => &line::ROW,
         DeviceKind::Hold { .. } => &hold::ROW,
+        DeviceKind::Quantity(_) => &quantity::ROW,
         DeviceKind::Diode { .. } => &diode::ROW,
     }
 }
@@ -119,6 +146,34 @@ pub fn row(kind: &DeviceKind) -> &'static Row {
 /// The current of a device that always has a branch, or none: never asked for, but 0 is true of nothing else.
 fn no_current(_: &Stamper, _: DeviceId) -> Current {
     Current::Linear(vec![])
+}
+
+/// What a behavioural storage holds when its own voltage, or its own current, is `value`; an error where its law speaks of
+/// anything else.
+fn stored_at(stamper: &mut Stamper, id: DeviceId, value: f64) -> Option<f64> {
+    let device = stamper.device(id);
+    let (law, coil) = match &device.kind {
+        DeviceKind::BehaviouralCapacitor { law, .. } => (law, false),
+        DeviceKind::BehaviouralInductor { law, .. } => (law, true),
+        _ => return None,
+    };
+    let stored = law.evaluate(&mut |leaf| match *leaf {
+        Leaf::Voltage(a, b) if !coil && device.nodes[..] == [a, b] => value,
+        Leaf::Voltage(a, b) if !coil && device.nodes[..] == [b, a] => -value,
+        Leaf::Current(own) if coil && own == id => value,
+        Leaf::Time => 0.0,
+        _ => f64::NAN,
+    });
+    if !stored.is_finite() {
+        let message = format!("what `{}` holds at the start is not known", device.name);
+        let own = if coil { "current" } else { "voltage" };
+        let error = Diagnostic::error("E0755", device.span, message)
+            .because(format!("its law speaks of more than its own {own}, or has no value there"))
+            .help("leave `ic=` out, and let `.ic` say the voltages of the nodes");
+        stamper.report(error);
+        return None;
+    }
+    Some(stored)
 }
 
 #[cfg(test)]

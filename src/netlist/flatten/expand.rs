@@ -1,15 +1,19 @@
 //! The first pass: scopes, nodes and numbered devices.
 
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
+use super::sources::Times;
 use super::values::near;
-use crate::circuit::{DeviceId, Node, NodeId};
+use crate::circuit::{self, DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
+use std::cell::RefCell;
 
 /// Instances within instances, at most.
 const DEEPEST: usize = 100;
+/// The temperature of what says none, in °C.
+const ROOM: f64 = 27.0;
 /// Devices, at most.
 const MOST: usize = 8_000_000;
 /// Instances, at most.
@@ -31,6 +35,14 @@ pub struct Flat<'n> {
     pub guesses: Vec<(ScopeId, Name, &'n Expr, Span)>,
     /// `.ic` values with their scopes.
     pub initial: Vec<(ScopeId, Name, &'n Expr, Span)>,
+    /// Step and end of the run.
+    pub times: Times,
+    /// The circuit's temperature, and that at which values are stated unless they say another, in °C.
+    pub temperature: f64,
+    /// See there.
+    pub nominal_temperature: f64,
+    /// What laws speak of and is no device of a card; numbered after those.
+    pub quantities: RefCell<Vec<circuit::Device>>,
 }
 
 /// A device that is not yet resolved.
@@ -58,6 +70,10 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         initial: vec![],
         live: vec![],
         guesses: vec![],
+        times: Times::default(),
+        temperature: ROOM,
+        nominal_temperature: ROOM,
+        quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());
     let mut expander =
@@ -410,5 +426,17 @@ impl<'n> Expander<'n> {
         self.chain.push(subcircuit);
         self.body(inner, &live, d);
         self.chain.pop();
+    }
+}
+
+impl Flat<'_> {
+    /// Whether a negative hysteresis means a smooth switch (LTspice).
+    pub fn smooth_when_negative(&self) -> bool {
+        false
+    }
+
+    /// Whether the knee of diodes is that of PSpice.
+    pub fn knee_by_root(&self) -> bool {
+        false
     }
 }

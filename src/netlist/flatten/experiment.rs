@@ -9,6 +9,7 @@ use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
+use crate::netlist::read::number;
 use crate::netlist::{CardKind, Expr, Name};
 use crate::source::{FileId, Span};
 use std::collections::{HashMap, HashSet};
@@ -54,6 +55,25 @@ pub fn settings(
     }
     options.extend(header.options.iter().cloned());
     (analyses, options)
+}
+
+/// The temperatures that options state, in °C; the last of several wins.
+pub fn temperatures(flat: &mut Flat, options: &[(String, String)], d: &mut Vec<Diagnostic>) {
+    for (key, text) in options {
+        let place = match key.as_str() {
+            "temp" => &mut flat.temperature,
+            "tnom" => &mut flat.nominal_temperature,
+            _ => continue,
+        };
+        let read = number::number(text).filter(|read| read.end == text.len());
+        match read.map(|read| read.value).filter(|value| *value > -273.15) {
+            Some(value) => *place = value,
+            None => {
+                let message = format!("`{key}={text}` is no temperature in °C");
+                d.push(Diagnostic::error("E0766", Span::NONE, message));
+            }
+        }
+    }
 }
 
 /// Output columns (those of the header, else those of `.save` and `.print`), and `.ic` values.

@@ -2,13 +2,16 @@
 
 use super::expand::{Flat, Pending};
 use super::scope;
+use super::models::{self, Key, Kind, OPEN};
+use super::passive;
 use super::sources::{self, Times};
 use super::values::Lookup;
-use crate::circuit::{self, Device, DeviceKind, DiodeModel, NodeId, Parts};
+use crate::circuit::{
+    self, Device, DeviceKind, DiodeInstance, DiodeModel, Knee, LawOf, NodeId, Parts,
+};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
-use crate::netlist::{Element, Expr, Name, Source, Waveform};
-use crate::quantity::nearest;
+use crate::netlist::{Element, Expr, Name, PassiveKind, Source, Waveform};
 
 /// Every device of a flat netlist. One that is wrong becomes a resistor, with an error, so that the others keep their
 /// numbers.
@@ -69,14 +72,39 @@ fn kind(
         let [a, b] = control.map(|name| lookup.node(scope, name, span, d));
         Some([a?, b?])
     };
+    let plain = |kind: PassiveKind,
+                 value: &Expr,
+                 initial: &Option<Expr>,
+                 d: &mut Vec<Diagnostic>| {
+        if let Some(passive) = passive::modelled(lookup, pending, kind, value, initial) {
+            return passive::kind(lookup, pending, &passive, d);
+        }
+        let start = perhaps(initial, d)?;
+        if scope::varies(&lookup.flat.scopes, scope, value) {
+            return Some(passive::by_law(kind, lookup.law(scope, value, d)?, start));
+        }
+        let value = number(value, d)?;
+        Some(match kind {
+            PassiveKind::Resistor => DeviceKind::Resistor { resistance: value },
+            PassiveKind::Capacitor => DeviceKind::Capacitor { capacitance: value, initial: start },
+            PassiveKind::Inductor => DeviceKind::Inductor { inductance: value, initial: start },
+        })
+    };
     Some(match &pending.device.element {
-        Element::Resistor { value } => DeviceKind::Resistor { resistance: number(value, d)? },
-        Element::Capacitor { value, initial } => {
-            DeviceKind::Capacitor { capacitance: number(value, d)?, initial: perhaps(initial, d)? }
-        }
-        Element::Inductor { value, initial } => {
-            DeviceKind::Inductor { inductance: number(value, d)?, initial: perhaps(initial, d)? }
-        }
+        Element::Resistor { value } => plain(PassiveKind::Resistor, value, &None, d)?,
+        Element::Capacitor { value, initial } => plain(PassiveKind::Capacitor, value, initial, d)?,
+        Element::Inductor { value, initial } => plain(PassiveKind::Inductor, value, initial, d)?,
+        Element::Passive(passive) => passive::kind(lookup, pending, passive, d)?,
+        Element::Charge { law, initial } => DeviceKind::BehaviouralCapacitor {
+            law: lookup.law(scope, law, d)?,
+            law_of: LawOf::Stored,
+            initial: perhaps(initial, d)?,
+        },
+        Element::Flux { law, initial } => DeviceKind::BehaviouralInductor {
+            law: lookup.law(scope, law, d)?,
+            law_of: LawOf::Stored,
+            initial: perhaps(initial, d)?,
+        },
         Element::Mutual { inductors, coupling } => {
             let (first, second) = pending.pair;
             let (first, second) = (*inductors.get(first)?, *inductors.get(second)?);
@@ -99,6 +127,9 @@ fn kind(
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
             DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
+        }
+        Element::CurrentSource(Source { waveform: Waveform::Constant(law), .. }) if varies(law) => {
+            DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }
         }
         Element::CurrentSource(source) => {
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
@@ -144,134 +175,141 @@ fn kind(
         Element::Switch { model, control, on } => {
             let [a, b] = nodes(control, d)?;
             let control = circuit::Expr::leaf(circuit::Leaf::Voltage(a, b));
-            switch(lookup, pending, *model, "sw", control, *on, d)?
+            switch(lookup, pending, *model, false, control, *on, d)?
         }
         Element::CurrentSwitch { model, control, on } => {
             let device = lookup.device(scope, *control, span, d)?;
             let control = circuit::Expr::leaf(circuit::Leaf::Current(device));
-            switch(lookup, pending, *model, "csw", control, *on, d)?
+            switch(lookup, pending, *model, true, control, *on, d)?
         }
-        Element::Diode { model, area } => {
-            let area = perhaps(area, d)?.unwrap_or(1.0);
-            DeviceKind::Diode { model: diode(lookup, pending, *model, d)?, area }
+        Element::LawSwitch { model, control, on } => {
+            let control = lookup.law(scope, control, d)?;
+            switch(lookup, pending, *model, false, control, *on, d)?
+        }
+        Element::Diode { model, area, parameters } => {
+            diode(lookup, pending, *model, area, parameters, d)?
         }
         // Instances have been expanded.
         Element::Instance { .. } => return None,
     })
 }
 
-/// A key of a model: its name and its default.
-type Key = (&'static str, f64);
+/// Switches: thresholds with half widths, or both ends of a smooth transition.
+#[rustfmt::skip]
+const SWITCH: Kind = Kind {
+    names: &["sw", "csw", "vswitch", "iswitch", "switch"],
+    keys: &[
+        ("vt", OPEN), ("vh", OPEN), ("it", OPEN), ("ih", OPEN), ("ron", OPEN), ("roff", OPEN), ("von", OPEN), ("voff", OPEN),
+        ("vhon", OPEN), ("vhoff", OPEN), ("ion", OPEN), ("ioff", OPEN), ("ihon", OPEN), ("ihoff", OPEN), ("on", OPEN),
+        ("off", OPEN), ("hon", OPEN), ("hoff", OPEN),
+    ],
+    idle: &["td", "level"],
+    spellings: &[],
+};
 
-/// SW and CSW, with the defaults of ngspice.
-const SWITCH: &[Key] = &[("vt", 0.0), ("vh", 0.0), ("ron", 1.0), ("roff", 1e12)];
-const CURRENT_SWITCH: &[Key] = &[("it", 0.0), ("ih", 0.0), ("ron", 1.0), ("roff", 1e12)];
+/// D. `cj0` is another spelling of `cjo`; an infinite `bv` is none.
+#[rustfmt::skip]
+const DIODE: Kind = Kind {
+    names: &["d"],
+    keys: &[
+        ("level", 1.0), ("is", 1e-14), ("n", 1.0), ("rs", 0.0), ("cjo", 0.0), ("vj", 1.0), ("m", 0.5), ("tt", 0.0), ("fc", 0.5),
+        ("bv", f64::INFINITY), ("ibv", 1e-3), ("nbv", OPEN), ("ikf", OPEN), ("isr", 0.0), ("nr", 2.0), ("eg", 1.11),
+        ("xti", 3.0), ("tnom", OPEN), ("trs1", 0.0), ("trs2", 0.0), ("tm1", 0.0), ("tm2", 0.0), ("ttt1", 0.0), ("ttt2", 0.0),
+        ("jsw", 0.0), ("cjsw", 0.0), ("php", 1.0), ("mjsw", 0.33), ("fcs", 0.5), ("area", 1.0), ("pj", 0.0), ("tlev", 0.0),
+        ("tlevc", 0.0),
+    ],
+    // Noise, ratings and words for humans; Xyce's own for ageing.
+    idle: &[
+        "kf", "af", "mfg", "type", "vpk", "iave", "irms", "fv_max", "bv_max", "id_max", "te_max", "pd_max", "kc",
+    ],
+    spellings: &[
+        ("cj0", "cjo"), ("cj", "cjo"), ("js", "is"), ("pb", "vj"), ("mj", "m"), ("vb", "bv"), ("ik", "ikf"), ("trs", "trs1"),
+        ("tref", "tnom"), ("cjp", "cjsw"), ("cjsw0", "cjsw"), ("vjsw", "php"),
+    ],
+};
 
-/// D, level 1. `cj0` is another spelling of `cjo`; an infinite `bv` is none.
-const DIODE: &[Key] = &[
-    ("is", 1e-14),
-    ("n", 1.0),
-    ("rs", 0.0),
-    ("cjo", 0.0),
-    ("vj", 1.0),
-    ("m", 0.5),
-    ("tt", 0.0),
-    ("fc", 0.5),
-    ("bv", f64::INFINITY),
-    ("ibv", 1e-3),
-    ("level", 1.0),
-];
+/// What a diode's card may say besides its area.
+#[rustfmt::skip]
+const DIODE_OWN: &[Key] = &[("area", 1.0), ("pj", OPEN), ("m", 1.0), ("temp", OPEN), ("dtemp", 0.0), ("ic", OPEN)];
 
-/// Keys of diode models that matter in other analyses or at other temperatures only.
-const DIODE_IDLE: &[&str] =
-    &["eg", "xti", "kf", "af", "tnom", "trs", "trs1", "trs2", "tm1", "tm2", "mfg", "type"];
-
-/// Other spellings of keys.
-const SPELLINGS: &[(&str, &str)] =
-    &[("cj0", "cjo"), ("cj", "cjo"), ("js", "is"), ("pb", "vj"), ("mj", "m"), ("vb", "bv")];
-
-/// The values of a model of a kind, in the order of its keys.
-fn model(
-    lookup: &Lookup,
-    pending: &Pending,
-    name: Name,
-    kind: &str,
-    keys: &[Key],
-    idle: &[&str],
-    d: &mut Vec<Diagnostic>,
-) -> Option<Vec<f64>> {
-    let text = lookup.names.text(name);
-    let found = lookup
-        .flat
-        .scopes
-        .around(pending.scope)
-        .find_map(|(id, scope)| scope.models.get(&name).map(|model| (id, *model)));
-    let Some((id, (card, own, parameters))) = found else {
-        let models =
-            lookup.flat.scopes.around(pending.scope).flat_map(|(_, scope)| scope.models.keys());
-        let mut known: Vec<&str> = models.map(|name| lookup.names.text(*name)).collect();
-        known.sort_unstable();
-        let error =
-            Diagnostic::error("E0742", pending.card.span, format!("unknown model `{text}`"));
-        d.push(match nearest(text, known) {
-            Some(near) => error.help(format!("did you mean `{near}`?")),
-            None => error.help(format!("define it: .model {text} {kind}(…)")),
-        });
-        return None;
-    };
-    if own != kind {
-        let message = format!("`{text}` is a model of type `{own}`, `{kind}` is needed");
-        d.push(
-            Diagnostic::error("E0742", pending.card.span, message).label(card.span, "the model"),
-        );
-        return None;
-    }
-    let mut values: Vec<f64> = keys.iter().map(|(_, default)| *default).collect();
-    for (key, expr) in parameters {
-        let key =
-            SPELLINGS.iter().find(|(other, _)| other == key).map_or(key.as_str(), |(_, key)| key);
-        if let Some(k) = keys.iter().position(|(known, _)| *known == key) {
-            values[k] = lookup.number(id, expr, d)?;
-        } else if !idle.contains(&key) {
-            let span = if expr.span.is_none() { card.span } else { expr.span };
-            let error = Diagnostic::error(
-                "E0743",
-                span,
-                format!("models of type `{kind}` have no parameter `{key}`"),
-            );
-            let error = match nearest(key, keys.iter().map(|(known, _)| *known)) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error,
-            };
-            // One model, one message, however many devices use it.
-            if !d.contains(&error) {
-                d.push(error);
-            }
-            return None;
-        }
-    }
-    Some(values)
-}
+/// Resistances of switches with thresholds, and of smooth ones.
+const CRISP: [f64; 2] = [1.0, 1e12];
+const SMOOTH: [f64; 2] = [1.0, 1e6];
 
 fn switch(
     lookup: &Lookup,
     pending: &Pending,
     name: Name,
-    kind: &str,
+    current: bool,
     control: circuit::Expr,
     on: Option<bool>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<DeviceKind> {
-    let keys = if kind == "sw" { SWITCH } else { CURRENT_SWITCH };
-    let values = model(lookup, pending, name, kind, keys, &[], d)?;
-    let [threshold, hysteresis, on_resistance, off_resistance] = values[..] else { return None };
-    Some(DeviceKind::Switch {
-        control,
-        on: threshold + hysteresis,
-        off: threshold - hysteresis,
-        on_resistance,
-        off_resistance,
-        initially_on: on,
+    let values = models::model(lookup, pending, name, &SWITCH, d)?;
+    let either = |voltage: &str, current: &str, neutral: &str| {
+        values.given(voltage).or_else(|| values.given(current)).or_else(|| values.given(neutral))
+    };
+    let ends = (either("von", "ion", "on"), either("voff", "ioff", "off"));
+    let middle = (either("vt", "it", ""), either("vh", "ih", ""));
+    let smooth = matches!(values.kind.as_str(), "vswitch" | "iswitch" | "switch");
+    let mixed = match smooth {
+        true => middle.0.is_some() || middle.1.is_some(),
+        false => ends.0.is_some() || ends.1.is_some(),
+    };
+    if mixed {
+        let message = format!("models of type `{}` do not go over at these values", values.kind);
+        d.push(Diagnostic::error("E0743", pending.card.span, message).help(match smooth {
+            true => "von= and voff=, ion= and ioff=, on= and off= say where it is on and off",
+            false => "vt= and vh=, it= and ih= say where it goes over",
+        }));
+        return None;
+    }
+    let resistances = |[on, off]: [f64; 2]| {
+        (values.given("ron").unwrap_or(on), values.given("roff").unwrap_or(off))
+    };
+    if smooth {
+        let (on_resistance, off_resistance) = resistances(SMOOTH);
+        return Some(DeviceKind::SmoothSwitch {
+            control,
+            on: ends.0.unwrap_or(if current { 1e-3 } else { 1.0 }),
+            off: ends.1.unwrap_or(0.0),
+            holds_on: either("vhon", "ihon", "hon"),
+            holds_off: either("vhoff", "ihoff", "hoff"),
+            on_resistance,
+            off_resistance,
+            initially_on: on,
+        });
+    }
+    let (on_resistance, off_resistance) = resistances(CRISP);
+    let (threshold, half) = (middle.0.unwrap_or(0.0), middle.1.unwrap_or(0.0));
+    let (above, below) = (threshold + half.abs(), threshold - half.abs());
+    Some(match half < 0.0 {
+        false => DeviceKind::Switch {
+            control,
+            on: above,
+            off: below,
+            on_resistance,
+            off_resistance,
+            initially_on: on,
+        },
+        true if lookup.flat.smooth_when_negative() => DeviceKind::SmoothSwitch {
+            control,
+            on: above,
+            off: below,
+            holds_on: None,
+            holds_off: None,
+            on_resistance,
+            off_resistance,
+            initially_on: on,
+        },
+        true => DeviceKind::CrossedSwitch {
+            control,
+            above,
+            below,
+            on_resistance,
+            off_resistance,
+            initially_on: on,
+        },
     })
 }
 
@@ -279,27 +317,71 @@ fn diode(
     lookup: &Lookup,
     pending: &Pending,
     name: Name,
+    area: &Option<Expr>,
+    parameters: &[(String, Expr)],
     d: &mut Vec<Diagnostic>,
-) -> Option<DiodeModel> {
-    let values = model(lookup, pending, name, "d", DIODE, DIODE_IDLE, d)?;
-    let [is, n, rs, cjo, vj, m, tt, fc, bv, ibv, level] = values[..] else { return None };
-    if level != 1.0 {
-        let message = format!("diodes of level {level} are not read yet");
-        d.push(Diagnostic::error("E0743", pending.card.span, message));
+) -> Option<DeviceKind> {
+    let values = models::model(lookup, pending, name, &DIODE, d)?;
+    let own = models::own(lookup, pending, "diodes", parameters, DIODE_OWN, d)?;
+    let level = values.get("level");
+    if ![1.0, 2.0].contains(&level) {
+        let message = format!("diodes of level {level} are not read");
+        d.push(
+            Diagnostic::error("E0743", pending.card.span, message)
+                .because("what is known are those of SPICE 3 (level 1) and of PSpice (level 2)"),
+        );
         return None;
     }
-    Some(DiodeModel {
-        saturation_current: is,
-        emission: n,
-        series_resistance: rs,
-        junction_capacitance: cjo,
-        junction_potential: vj,
-        grading: m,
-        transit_time: tt,
-        forward_bias_depletion: fc,
-        breakdown_voltage: bv.is_finite().then_some(bv),
-        breakdown_current: ibv,
-    })
+    for key in ["tlev", "tlevc"] {
+        if values.get(key) != 0.0 {
+            let message = format!("`{key}={}` of the diode's model is not read", values.get(key));
+            let error = Diagnostic::error("E0743", pending.card.span, message);
+            d.push(error.because("temperature changes the parameters as in SPICE 3, which is 0"));
+            return None;
+        }
+    }
+    let area = match area {
+        Some(expr) => lookup.number(pending.scope, expr, d)?,
+        None => own.get("area"),
+    };
+    let pspice = level == 2.0 || lookup.flat.knee_by_root();
+    let model = DiodeModel {
+        saturation_current: values.get("is"),
+        emission: values.get("n"),
+        series_resistance: values.get("rs"),
+        junction_capacitance: values.get("cjo"),
+        junction_potential: values.get("vj"),
+        grading: values.get("m"),
+        transit_time: values.get("tt"),
+        forward_bias_depletion: values.get("fc"),
+        breakdown_voltage: Some(values.get("bv")).filter(|bv| bv.is_finite()),
+        breakdown_current: values.get("ibv"),
+        breakdown_emission: values.given("nbv"),
+        recombination_current: values.get("isr"),
+        recombination_emission: values.get("nr"),
+        knee: values
+            .given("ikf")
+            .filter(|knee| *knee != 0.0)
+            .map(|knee| (knee, if pspice { Knee::Root } else { Knee::Quotient })),
+        energy_gap: values.get("eg"),
+        saturation_exponent: values.get("xti"),
+        nominal_temperature: values.given("tnom").unwrap_or(lookup.flat.nominal_temperature),
+        resistance_slopes: [values.get("trs1"), values.get("trs2")],
+        grading_slopes: [values.get("tm1"), values.get("tm2")],
+        transit_slopes: [values.get("ttt1"), values.get("ttt2")],
+        sidewall_current: values.get("jsw"),
+        sidewall_capacitance: values.get("cjsw"),
+        sidewall_potential: values.get("php"),
+        sidewall_grading: values.get("mjsw"),
+        sidewall_depletion: values.get("fcs"),
+    };
+    let instance = DiodeInstance {
+        area: area * values.get("area"),
+        perimeter: own.given("pj").unwrap_or(values.get("pj")),
+        multiplicity: own.get("m"),
+        temperature: own.given("temp").unwrap_or(lookup.flat.temperature + own.get("dtemp")),
+    };
+    Some(DeviceKind::Diode { model, instance })
 }
 
 /// Whether any device stands at ground.

@@ -7,7 +7,12 @@ pub mod scope;
 pub mod expand;
 pub mod values;
 mod kinds;
+mod models;
+mod passive;
+mod patterns;
 mod sources;
+mod operators;
+mod transfer;
 mod experiment;
 mod measures;
 mod usage;
@@ -26,13 +31,16 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         diagnostics.push(Diagnostic::warning("W0730", Span::NONE, message));
     }
     usage::check(netlist, &header, diagnostics);
-    let flat = expand::expand(netlist, diagnostics);
+    let mut flat = expand::expand(netlist, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
     let times = sources::Times::of(&analyses);
-    let devices = kinds::resolve(&flat, &header, times, diagnostics);
+    flat.times = times;
+    experiment::temperatures(&mut flat, &options, diagnostics);
+    let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
     let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
     let (measures, watched) = measures::resolve(&flat, diagnostics);
+    devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
         title: netlist.title.clone(),
         nodes: flat.nodes,

@@ -2,6 +2,7 @@
 
 use crate::circuit::{DeviceId, NodeId};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::parts::every_leaf;
 use crate::netlist::{Card, Expr, Leaf, Name, Names, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
@@ -158,7 +159,7 @@ pub fn parameters(
                 continue;
             };
             let mut next = None;
-            expr.leaves(&mut |leaf, span| {
+            every_leaf(expr, &mut |leaf, span| {
                 if let Leaf::Parameter(used) = leaf
                     && next.is_none()
                     && wanted.contains_key(used)
@@ -223,7 +224,7 @@ pub fn parameters(
 
 fn failed_within(expr: &Expr, failed: &Table<()>) -> bool {
     let mut found = false;
-    expr.leaves(&mut |leaf, _| {
+    every_leaf(expr, &mut |leaf, _| {
         if let Leaf::Parameter(name) = leaf {
             found |= failed.contains_key(name);
         }
@@ -257,7 +258,7 @@ pub fn number(
                     scopes.parameter(id, *name).is_some() || constant(names.text(*name)).is_some();
                 (!known).then(|| unknown_parameter(scopes, id, *name, span, names, look))
             }
-            Leaf::Voltage(..) | Leaf::Current(_) | Leaf::Time => Some(
+            _ => Some(
                 Diagnostic::error("E0732", span, "this value must be a number")
                     .says("it changes during the run")
                     .help(

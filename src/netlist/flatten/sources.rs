@@ -5,13 +5,14 @@
 //! | PULSE | rise, fall: the step of `.tran`; width, period: its end |
 //! | SIN | frequency: 1 over the end of `.tran` |
 //! | EXP | delays and time constants: the step of `.tran`, the second delay one step after the first |
-//! | SFFM | both frequencies: 1 over the end of `.tran` |
+//! | SFFM, AM | both frequencies: 1 over the end of `.tran` |
 //!
 //! A rise or fall that the header lists as a jump is one, exactly; other arguments stay as they are.
 //!
 //! Source: ngspice 39, src/spicelib/devices/vsrc/vsrcload.c.
 
 use super::expand::Pending;
+use super::patterns;
 use super::values::Lookup;
 use crate::circuit::{self, Analysis, Parts};
 use crate::diagnostic::Diagnostic;
@@ -20,10 +21,16 @@ use crate::netlist::read::waveforms;
 use crate::netlist::{Expr, Shape, Source, Waveform};
 
 /// Step and end of the transient analysis.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Times {
     step: f64,
     stop: f64,
+}
+
+impl Default for Times {
+    fn default() -> Times {
+        Times { step: 0.0, stop: 1.0 }
+    }
 }
 
 impl Times {
@@ -33,7 +40,7 @@ impl Times {
             Analysis::Transient { step, stop, .. } => Some(Times { step: *step, stop: *stop }),
             Analysis::OperatingPoint => None,
         });
-        transient.unwrap_or(Times { step: 0.0, stop: 1.0 })
+        transient.unwrap_or_default()
     }
 }
 
@@ -46,29 +53,67 @@ pub fn waveform(
     times: Times,
     d: &mut Vec<Diagnostic>,
 ) -> Option<circuit::Waveform> {
-    let (shape, arguments) = match waveform {
+    let span = pending.card.span;
+    let name = lookup.flat.device_name(pending);
+    let jumps = header.jumps.iter().find(|jumps| jumps.device.eq_ignore_ascii_case(&name));
+    let mut numbers = |arguments: &[Expr]| {
+        let mut values = Vec::with_capacity(arguments.len());
+        for argument in arguments {
+            values.push(lookup.number(pending.scope, argument, d)?);
+        }
+        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+            let message = format!("an argument of the waveform is {value}");
+            d.push(Diagnostic::error("E0744", span, message));
+            return None;
+        }
+        Some(values)
+    };
+    let mut perhaps = |expr: &Option<Expr>| match expr {
+        Some(expr) => numbers(std::slice::from_ref(expr)).map(|values| values.first().copied()),
+        None => Some(None),
+    };
+    let (made, function) = match waveform {
         Waveform::Constant(value) => {
             return Some(circuit::Waveform::Constant(lookup.number(pending.scope, value, d)?));
         }
-        Waveform::Function { shape, arguments } => (*shape, arguments),
+        Waveform::Function { shape, arguments } => {
+            let values = numbers(arguments)?;
+            (Ok(made(*shape, &values, times, jumps)), waveforms::row(*shape).name)
+        }
+        Waveform::Points { points, repeat, delay } => {
+            let (repeat, delay) = (perhaps(repeat)?, perhaps(delay)?.unwrap_or(0.0));
+            (patterns::points(&numbers(points)?, repeat, delay), "pwl")
+        }
+        Waveform::Pattern { arguments, bits, repeat } => {
+            let repeat = perhaps(repeat)?;
+            (patterns::pattern(&numbers(arguments)?, bits, repeat), "pat")
+        }
     };
-    let mut values = Vec::with_capacity(arguments.len());
-    for argument in arguments {
-        values.push(lookup.number(pending.scope, argument, d)?);
+    let sound = made.and_then(|made| senseless(&made).map_or(Ok(made), Err));
+    match sound {
+        Ok(made) => Some(made),
+        Err(why) => {
+            let function = function.to_uppercase();
+            let message = format!("the {function} of `{name}` makes no sense: {why}");
+            d.push(Diagnostic::error("E0744", span, message));
+            None
+        }
     }
-    let span = pending.card.span;
-    if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-        d.push(Diagnostic::error("E0744", span, format!("an argument of the waveform is {value}")));
-        return None;
-    }
+}
+
+/// A waveform from the values of its arguments.
+pub fn made(
+    shape: Shape,
+    values: &[f64],
+    times: Times,
+    jumps: Option<&Jumps>,
+) -> circuit::Waveform {
     // The argument, or the default where it is left out or 0.
     let or = |k: usize, default: f64| {
         values.get(k).copied().filter(|value| *value != 0.0).unwrap_or(default)
     };
     let plain = |k: usize| or(k, 0.0);
-    let name = lookup.flat.device_name(pending);
-    let jumps = header.jumps.iter().find(|jumps| jumps.device.eq_ignore_ascii_case(&name));
-    let made = match shape {
+    match shape {
         Shape::Pulse => circuit::Waveform::Pulse {
             low: plain(0),
             high: plain(1),
@@ -86,7 +131,7 @@ pub fn waveform(
             damping: plain(4),
             phase: plain(5).to_radians(),
         },
-        Shape::Pwl => circuit::Waveform::Pwl(points(&values, jumps)),
+        Shape::Pwl => circuit::Waveform::Pwl(points(values, jumps)),
         Shape::Exp => {
             let rise_delay = or(2, times.step);
             circuit::Waveform::Exponential {
@@ -105,18 +150,13 @@ pub fn waveform(
             index: plain(3),
             signal: or(4, 1.0 / times.stop),
         },
-    };
-    match senseless(&made) {
-        None => Some(made),
-        Some(why) => {
-            let function = waveforms::row(shape).name.to_uppercase();
-            d.push(Diagnostic::error(
-                "E0744",
-                span,
-                format!("the {function} of `{name}` makes no sense: {why}"),
-            ));
-            None
-        }
+        Shape::Am => circuit::Waveform::Am {
+            amplitude: plain(0),
+            offset: plain(1),
+            signal: or(2, 1.0 / times.stop),
+            carrier: or(3, 1.0 / times.stop),
+            delay: plain(4),
+        },
     }
 }
 
@@ -172,13 +212,13 @@ fn points(values: &[f64], jumps: Option<&Jumps>) -> Vec<(f64, f64)> {
 }
 
 /// Why a waveform makes no sense, if it makes none.
-fn senseless(waveform: &circuit::Waveform) -> Option<&'static str> {
+pub fn senseless(waveform: &circuit::Waveform) -> Option<&'static str> {
     match waveform {
         circuit::Waveform::Pulse { rise, fall, width, period, .. } => [rise, fall, width, period]
             .iter()
             .any(|time| **time < 0.0)
             .then_some("a time is negative"),
-        circuit::Waveform::Pwl(points) => {
+        circuit::Waveform::Pwl(points) | circuit::Waveform::Repeating { points, .. } => {
             points.windows(2).any(|pair| pair[1].0 < pair[0].0).then_some("its times run backwards")
         }
         circuit::Waveform::Exponential { rise_tau, fall_tau, rise_delay, fall_delay, .. } => {

@@ -3,6 +3,7 @@
 use super::values::NEAR;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
+use crate::netlist::parts::every_leaf;
 use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist, read};
 use crate::quantity::nearest;
 use crate::source::Span;
@@ -69,7 +70,7 @@ impl Usage {
     }
 
     fn expr(&mut self, expr: &Expr) {
-        expr.leaves(&mut |leaf, _| {
+        every_leaf(expr, &mut |leaf, _| {
             if let Leaf::Voltage(plus, minus) = leaf {
                 self.count(*plus);
                 if let Some(minus) = minus {
@@ -104,7 +105,16 @@ impl Usage {
                             control.iter().for_each(|node| self.count(*node));
                         }
                         Element::BehaviouralVoltage { law }
-                        | Element::BehaviouralCurrent { law } => self.expr(law),
+                        | Element::BehaviouralCurrent { law }
+                        | Element::Resistor { value: law }
+                        | Element::Capacitor { value: law, .. }
+                        | Element::Inductor { value: law, .. }
+                        | Element::Charge { law, .. }
+                        | Element::Flux { law, .. }
+                        | Element::LawSwitch { control: law, .. } => self.expr(law),
+                        Element::Passive(passive) => {
+                            passive.value.iter().for_each(|law| self.expr(law));
+                        }
                         _ => {}
                     }
                 }

@@ -217,10 +217,13 @@ impl<'f, 'n> Lookup<'f, 'n> {
                     None => Node::Number(f64::NAN),
                 },
                 Leaf::Time => Node::Leaf(circuit::Leaf::Time),
+                Leaf::Operator(operator, arguments) => {
+                    return self.operator(id, *operator, arguments, span, d);
+                }
             };
             circuit::Expr::new(node, span)
         });
-        (d.len() == before).then_some(law)
+        (d.len() == before).then(|| self.timed_tables(law))
     }
 }
 

@@ -147,7 +147,13 @@ impl<'a> Writer<'a> {
                 self.switch(card, device, template, "ic", *model, "it", None, vec![*control]);
             }
             // Refused by the table of lacks.
-            Element::Line { .. } | Element::Diode { .. } | Element::Instance { .. } => {}
+            Element::Line { .. }
+            | Element::Diode { .. }
+            | Element::Passive(_)
+            | Element::Charge { .. }
+            | Element::Flux { .. }
+            | Element::LawSwitch { .. }
+            | Element::Instance { .. } => {}
         }
     }
 

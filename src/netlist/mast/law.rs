@@ -187,11 +187,17 @@ impl Writer {
         let x = text(&self.named(argument, before));
         let name = self.own();
         let mut cases = vec![Statement::Set(name.clone(), number(last))];
+        let mut cells = table.cells();
         for pair in points.windows(2).rev() {
-            let &[(x0, y0), (x1, y1)] = pair else { continue };
-            let slope = (y1 - y0) / (x1 - x0);
+            let (&[(x0, _), (x1, _)], Some(cell)) = (pair, cells.pop()) else { continue };
             let from = |value: f64| Expr::<String>::number(value);
-            let line = from(y0) + from(slope) * (Expr::leaf(x.clone()) - from(x0));
+            let since = || Expr::leaf(x.clone()) - from(x0);
+            let inner = cell.last().copied().unwrap_or(f64::NAN);
+            let line = cell
+                .iter()
+                .rev()
+                .skip(1)
+                .fold(from(inner), |inner, factor| from(*factor) + inner * since());
             let then = vec![Statement::Set(name.clone(), text(&line))];
             cases = vec![Statement::Cases(format!("{x} < {}", number(x1)), then, cases)];
         }

@@ -14,6 +14,7 @@ mod words;
 use super::adapt::{self, Lack};
 use super::dialects::Dialect;
 use super::header::Header;
+use super::lacks;
 use super::{Card, CardKind, Device, Element, Expr, Leaf, Name, Netlist, Waveform};
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::expr::print::number;
@@ -49,6 +50,16 @@ pub const LACKS: &[Lack] = &[
         what: "a subcircuit",
         help: "a flat netlist can be written",
     },
+    lacks::PASSIVE_LAW,
+    lacks::MODELLED,
+    lacks::PAST,
+    lacks::SOURCE_LAW,
+    lacks::PARTS,
+    lacks::REPEATED,
+    lacks::PATTERN,
+    lacks::AMPLITUDE,
+    lacks::LAW_SWITCH,
+    lacks::SMOOTH_SWITCH,
     Lack { help: "one with a single threshold can be written", ..adapt::SWITCHING_HYSTERESIS },
 ];
 

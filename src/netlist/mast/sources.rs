@@ -25,10 +25,13 @@ impl<'a> Writer<'a> {
             Template::new(&format!("bg_{letter}{shape}"), &format!("{what} source{about}"))
         };
         let (mut template, arguments) = match waveform {
+            // Refused by the table of lacks.
+            Waveform::Points { .. } | Waveform::Pattern { .. } => return,
             Waveform::Constant(value) => {
                 (named("", "").numbers(&["dc"]), vec![self.value(card, value)])
             }
             Waveform::Function { shape, arguments } => match shape {
+                Shape::Am => return,
                 Shape::Pwl => {
                     let points = arguments.len() / 2;
                     let template = named(&format!("_pwl{points}"), ", straight lines");

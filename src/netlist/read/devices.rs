@@ -402,7 +402,7 @@ fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<
             None => break,
         }
     }
-    Some(Element::Diode { model, area })
+    Some(Element::Diode { model, area, parameters: vec![] })
 }
 
 fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {

@@ -266,7 +266,7 @@ pub fn table(points: &[f64]) -> Option<Table> {
         return None;
     }
     let column = |k: usize| points.chunks(2).map(|pair| pair[k]).collect();
-    Some(Table { x: column(0), y: column(1) })
+    Some(Table::lines(column(0), column(1)))
 }
 
 /// x, where the argument is `min(max(x, first), last)`: a table that holds its ends, as a netlist for ngspice has to

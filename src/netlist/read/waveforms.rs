@@ -24,6 +24,7 @@ pub const WAVEFORMS: &[Row] = &[
     Row { name: "pwl", shape: Shape::Pwl, least: 2, arguments: &["t", "y"] },
     Row { name: "exp", shape: Shape::Exp, least: 2, arguments: &["v1", "v2", "td1", "tau1", "td2", "tau2"] },
     Row { name: "sffm", shape: Shape::Sffm, least: 2, arguments: &["vo", "va", "fc", "mdi", "fs"] },
+    Row { name: "am", shape: Shape::Am, least: 2, arguments: &["va", "vo", "mf", "fc", "td"] },
 ];
 
 /// The row of a waveform.
@@ -34,6 +35,7 @@ pub fn row(shape: Shape) -> &'static Row {
         Shape::Pwl => &WAVEFORMS[2],
         Shape::Exp => &WAVEFORMS[3],
         Shape::Sffm => &WAVEFORMS[4],
+        Shape::Am => &WAVEFORMS[5],
     }
 }
 

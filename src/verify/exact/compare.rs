@@ -253,6 +253,7 @@ fn columns<F: Modular>(
                 Leaf::Voltage(a, b) => there(a) && b.as_ref().is_none_or(there),
                 Leaf::Parameter(name) | Leaf::Current(name) => there(name),
                 Leaf::Time => true,
+                Leaf::Operator(..) => false,
             };
         });
         let law = match observation.unit.1 {

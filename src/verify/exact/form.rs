@@ -133,7 +133,8 @@ impl<F: Modular> Reading<'_, F> {
             Node::Table(a, table) => {
                 let points: Vec<u64> =
                     table.x.iter().chain(&table.y).map(|value| value.to_bits()).collect();
-                self.opaque(&("table", points), &[self.form(a, leaf)?])?
+                let curve = format!("{:?}", table.curve);
+                self.opaque(&("table", curve, points), &[self.form(a, leaf)?])?
             }
         };
         Ok(self.uncut(found))

@@ -82,6 +82,7 @@ impl<'n> Text<'n> {
                         }
                         Leaf::Current(name) => Leaf::Current(there(*name)?),
                         Leaf::Time => Leaf::Time,
+                        Leaf::Operator(..) => return Err("an operator".to_string()),
                     };
                     Ok(Expr::new(crate::expr::Node::Leaf(leaf), span))
                 });

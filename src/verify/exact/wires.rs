@@ -128,6 +128,10 @@ impl<'t, F: Modular> Wires<'t, F> {
             | DeviceKind::CurrentSource { .. }
             | DeviceKind::Vccs { .. }
             | DeviceKind::Switch { .. }
+            | DeviceKind::CrossedSwitch { .. }
+            | DeviceKind::SmoothSwitch { .. }
+            | DeviceKind::BehaviouralCapacitor { .. }
+            | DeviceKind::Quantity(_)
             | DeviceKind::Diode { .. } => false,
             DeviceKind::Inductor { .. }
             | DeviceKind::VoltageSource { .. }
@@ -136,6 +140,8 @@ impl<'t, F: Modular> Wires<'t, F> {
             | DeviceKind::Ccvs { .. }
             | DeviceKind::BehaviouralVoltage { .. }
             | DeviceKind::BehaviouralCurrent { .. }
+            | DeviceKind::BehaviouralResistor { .. }
+            | DeviceKind::BehaviouralInductor { .. }
             | DeviceKind::Line { .. }
             | DeviceKind::Hold { .. } => true,
         })
@@ -207,6 +213,7 @@ impl<'t, F: Modular> Wires<'t, F> {
                 current.cloned().ok_or_else(|| unknown(*name))
             }
             Leaf::Time => Ok(Form::number(self.bonds.draw.of(Of::Time))),
+            Leaf::Operator(..) => Err(Trouble::Nonlinear),
         }
     }
 

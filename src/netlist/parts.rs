@@ -1,0 +1,83 @@
+//! Parts of cards that need more than a word: passive devices with a model, values that follow from the past.
+
+use super::{Expr, Leaf, Name};
+use crate::expr::Node;
+use crate::source::Span;
+
+/// A resistor, capacitor or inductor of a model, or with parameters besides its value.
+#[derive(Clone, Debug)]
+pub struct Passive {
+    /// Which.
+    pub kind: PassiveKind,
+    /// Its value as it stands, a number or a law.
+    pub value: Option<Expr>,
+    /// Its model.
+    pub model: Option<Name>,
+    /// `ic=`.
+    pub initial: Option<Expr>,
+    /// `l=`, `w=`, `tc1=` and so on; folded to lower case.
+    pub parameters: Vec<(String, Expr)>,
+}
+
+/// Passive devices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum PassiveKind {
+    Resistor,
+    Capacitor,
+    Inductor,
+}
+
+impl PassiveKind {
+    /// The type of its models.
+    pub fn model(self) -> &'static str {
+        match self {
+            PassiveKind::Resistor => "r",
+            PassiveKind::Capacitor => "c",
+            PassiveKind::Inductor => "l",
+        }
+    }
+}
+
+/// What makes a value of others over time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    /// `ddt(x)`.
+    Derivative,
+    /// `sdt(x)`, `idt(x, initial)`: the integral from the start on.
+    Integral,
+    /// `delay(x, seconds)`.
+    Delay,
+    /// A rational function of s: the input, then the function, in which the parameter `s` is meant.
+    Transfer,
+    /// `spice_pulse(…)` and the like: a waveform of numbers.
+    Waveform(super::Shape),
+}
+
+/// Every leaf of an expression, those within operators too.
+pub fn every_leaf<'a>(expr: &'a Expr, visit: &mut dyn FnMut(&'a Leaf, Span)) {
+    expr.leaves(&mut |leaf, span| {
+        visit(leaf, span);
+        if let Leaf::Operator(_, arguments) = leaf {
+            arguments.iter().for_each(|argument| every_leaf(argument, visit));
+        }
+    });
+}
+
+/// The expression with each leaf replaced, those within operators too.
+pub fn map_leaves(expr: &Expr, replace: &mut dyn FnMut(&Leaf, Span) -> Expr) -> Expr {
+    expr.map(&mut |leaf, span| match leaf {
+        Leaf::Operator(operator, arguments) => {
+            let arguments = arguments.iter().map(|a| map_leaves(a, replace)).collect();
+            Expr::new(Node::Leaf(Leaf::Operator(*operator, arguments)), span)
+        }
+        other => replace(other, span),
+    })
+}
+
+/// Whether an expression changes during a run: it speaks of voltages, currents, time or the past.
+pub fn varies(expr: &Expr) -> bool {
+    let mut found = false;
+    expr.leaves(&mut |leaf, _| found |= !matches!(leaf, Leaf::Parameter(_)));
+    found
+}
