@@ -80,6 +80,7 @@ impl Binary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::expr::Table;
 
     #[test]
     fn tables_hold_their_end_values() {

@@ -65,7 +65,8 @@ pub fn temperatures(flat: &mut Flat, options: &[(String, String)], d: &mut Vec<D
             "tnom" => &mut flat.nominal_temperature,
             _ => continue,
         };
-        let read = number::number(text).filter(|read| read.end == text.len());
+        let read = number::number(text, flat.netlist.dialect.reading().numbers)
+            .filter(|read| read.end == text.len());
         match read.map(|read| read.value).filter(|value| *value > -273.15) {
             Some(value) => *place = value,
             None => {

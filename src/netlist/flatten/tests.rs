@@ -114,9 +114,9 @@ fn models_become_numbers() {
         (*on, control.node.as_ref()),
         (1.0, &crate::expr::Node::Leaf(Leaf::Current(DeviceId(3))))
     );
-    let DeviceKind::Diode { model, area } = kind(&c, "d1") else { panic!() };
+    let DeviceKind::Diode { model, instance } = kind(&c, "d1") else { panic!() };
     assert_eq!(
-        (*area, model.saturation_current, model.breakdown_voltage, model.grading),
+        (instance.area, model.saturation_current, model.breakdown_voltage, model.grading),
         (2.0, 76.9e-12, Some(5.0), 0.5)
     );
     stamps(&c);

@@ -1,10 +1,8 @@
 //! Device cards, by their first letter.
 
-use super::{Cursor, Reader, expression, waveforms};
+use super::{Cursor, Reader, linked, passive, waveforms};
 use crate::diagnostic::Diagnostic;
-use crate::expr::Node;
-use crate::netlist::{Device, Element, Expr, Name};
-use std::sync::Arc;
+use crate::netlist::{Device, Element, Expr, Name, PassiveKind};
 
 /// One row of the table: a letter, the number of nodes that its card names first, and what follows them.
 pub struct Letter {
@@ -20,21 +18,21 @@ pub struct Letter {
 /// Every letter that is read.
 #[rustfmt::skip]
 pub const LETTERS: &[Letter] = &[
-    Letter { letter: b'R', nodes: 2, form: "Rname n+ n- value", read: resistor },
-    Letter { letter: b'C', nodes: 2, form: "Cname n+ n- value [ic=volts]", read: capacitor },
-    Letter { letter: b'L', nodes: 2, form: "Lname n+ n- value [ic=amperes]", read: inductor },
-    Letter { letter: b'K', nodes: 0, form: "Kname L1 L2 coupling", read: mutual },
-    Letter { letter: b'V', nodes: 2, form: "Vname n+ n- [value] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…)]", read: |r, c, _| Some(Element::VoltageSource(waveforms::source(r, c)?)) },
-    Letter { letter: b'I', nodes: 2, form: "Iname n+ n- [value] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…)]", read: |r, c, _| Some(Element::CurrentSource(waveforms::source(r, c)?)) },
-    Letter { letter: b'E', nodes: 2, form: "Ename n+ n- c+ c- gain, or Ename n+ n- VALUE={expression}", read: vcvs },
-    Letter { letter: b'G', nodes: 2, form: "Gname n+ n- c+ c- gain, or Gname n+ n- VALUE={expression}", read: vccs },
-    Letter { letter: b'F', nodes: 2, form: "Fname n+ n- device gain", read: cccs },
-    Letter { letter: b'H', nodes: 2, form: "Hname n+ n- device gain", read: ccvs },
-    Letter { letter: b'B', nodes: 2, form: "Bname n+ n- V=expression, or I=expression", read: behavioural },
-    Letter { letter: b'S', nodes: 2, form: "Sname n+ n- c+ c- model [ON | OFF]", read: switch },
+    Letter { letter: b'R', nodes: 2, form: "Rname n+ n- value [model] [tc1=… tc2=… m=…], or R={expression}", read: |r, c, n| passive::read(r, c, n, PassiveKind::Resistor) },
+    Letter { letter: b'C', nodes: 2, form: "Cname n+ n- value [model] [ic=volts], or C={expression}, Q={expression}", read: |r, c, n| passive::read(r, c, n, PassiveKind::Capacitor) },
+    Letter { letter: b'L', nodes: 2, form: "Lname n+ n- value [model] [ic=amperes], or L={expression}, Flux={expression}", read: |r, c, n| passive::read(r, c, n, PassiveKind::Inductor) },
+    Letter { letter: b'K', nodes: 0, form: "Kname L1 L2 … coupling", read: mutual },
+    Letter { letter: b'V', nodes: 2, form: "Vname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::VoltageSource(waveforms::source(r, c)?)) },
+    Letter { letter: b'I', nodes: 2, form: "Iname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::CurrentSource(waveforms::source(r, c)?)) },
+    Letter { letter: b'E', nodes: 2, form: "Ename n+ n- c+ c- gain, or VALUE={expression}, POLY(n) …, TABLE {x} = (x,y) …, LAPLACE {x} = {H(s)}", read: linked::vcvs },
+    Letter { letter: b'G', nodes: 2, form: "Gname n+ n- c+ c- gain, or VALUE={expression}, POLY(n) …, TABLE {x} = (x,y) …, LAPLACE {x} = {H(s)}", read: linked::vccs },
+    Letter { letter: b'F', nodes: 2, form: "Fname n+ n- device gain, or POLY(n) device … coefficients", read: linked::cccs },
+    Letter { letter: b'H', nodes: 2, form: "Hname n+ n- device gain, or POLY(n) device … coefficients", read: linked::ccvs },
+    Letter { letter: b'B', nodes: 2, form: "Bname n+ n- V=expression, or I=expression", read: linked::behavioural },
+    Letter { letter: b'S', nodes: 2, form: "Sname n+ n- c+ c- model [ON | OFF], or model [ON | OFF] CONTROL={expression}", read: switch },
     Letter { letter: b'W', nodes: 2, form: "Wname n+ n- device model [ON | OFF]", read: current_switch },
     Letter { letter: b'T', nodes: 2, form: "Tname a+ a- b+ b- Z0=ohms TD=seconds, or F=hertz [NL=lengths]; [IC=v1,i1,v2,i2]", read: line },
-    Letter { letter: b'D', nodes: 2, form: "Dname anode cathode model [area]", read: diode },
+    Letter { letter: b'D', nodes: 2, form: "Dname anode cathode model [area] [pj=… m=… temp=…]", read: diode },
     Letter { letter: b'X', nodes: 0, form: "Xname nodes … subcircuit [parameter=value …]", read: instance },
 ];
 
@@ -104,55 +102,6 @@ fn element(reader: &mut Reader, cursor: &mut Cursor, row: &Letter) -> Option<(Ve
     Some((nodes, element))
 }
 
-fn resistor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let (value, _) = passive(reader, cursor, "r", "the resistance")?;
-    Some(Element::Resistor { value })
-}
-
-fn capacitor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let (value, initial) = passive(reader, cursor, "c", "the capacitance")?;
-    Some(Element::Capacitor { value, initial })
-}
-
-fn inductor(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let (value, initial) = passive(reader, cursor, "l", "the inductance")?;
-    Some(Element::Inductor { value, initial })
-}
-
-/// A value, bare or after `r=`, and `ic=`.
-fn passive(
-    reader: &mut Reader,
-    cursor: &mut Cursor,
-    key: &str,
-    what: &str,
-) -> Option<(Expr, Option<Expr>)> {
-    let (mut value, mut initial) = (None, None);
-    while !cursor.is_done() {
-        let here = *cursor;
-        match cursor.key() {
-            Some((word, _)) if word.eq_ignore_ascii_case(key) => {
-                value = Some(reader.value(cursor, what)?)
-            }
-            Some((word, _)) if word.eq_ignore_ascii_case("ic") && key != "r" => {
-                initial = Some(reader.value(cursor, "the initial value")?);
-            }
-            Some((word, from)) => {
-                let span = cursor.span(reader, from, from + word.len());
-                let error = Diagnostic::error("E0704", span, format!("`{word}=` is not read"));
-                reader.diagnostics.push(error);
-                *cursor = Cursor { at: cursor.text.len(), ..here };
-                return None;
-            }
-            None if value.is_none() => value = Some(reader.value(cursor, what)?),
-            None => break,
-        }
-    }
-    if value.is_none() {
-        reader.missing(cursor, what);
-    }
-    Some((value?, initial))
-}
-
 fn mutual(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
     let mut inductors = vec![];
     while cursor.next_word().starts_with(['l', 'L', 'x', 'X']) {
@@ -171,133 +120,6 @@ fn mutual(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option
     }
     let coupling = reader.value(cursor, "the coupling")?;
     Some(Element::Mutual { inductors, coupling })
-}
-
-/// What E and G may say after their nodes.
-enum Linked {
-    Gain(Expr, [Name; 2]),
-    Law(Expr),
-}
-
-fn linked(reader: &mut Reader, cursor: &mut Cursor) -> Option<Linked> {
-    let mut ahead = *cursor;
-    let (word, from) = ahead.word();
-    ahead.blanks();
-    let keyed = matches!(ahead.peek(), Some(b'=' | b'{' | b'\'' | b'('));
-    let is = |keyword: &str| word.eq_ignore_ascii_case(keyword) && keyed;
-    if is("value") || is("vol") || is("cur") {
-        *cursor = ahead;
-        cursor.take(b'=');
-        return Some(Linked::Law(law(reader, cursor)?));
-    }
-    if is("table") {
-        *cursor = ahead;
-        cursor.take(b'=');
-        return Some(Linked::Law(table(reader, cursor)?));
-    }
-    if is("poly") {
-        let span = cursor.span(reader, from, from + word.len());
-        reader.diagnostics.push(
-            Diagnostic::error("E0702", span, "polynomials are not read yet")
-                .help("write the polynomial as VALUE={…}"),
-        );
-        return None;
-    }
-    let first = reader.node(cursor, "the first controlling node")?;
-    let second = reader.node(cursor, "the second controlling node")?;
-    cursor.loose();
-    Some(Linked::Gain(reader.value(cursor, "the gain")?, [first, second]))
-}
-
-fn vcvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    Some(match linked(reader, cursor)? {
-        Linked::Gain(gain, control) => Element::Vcvs { gain, control },
-        Linked::Law(law) => Element::BehaviouralVoltage { law },
-    })
-}
-
-fn vccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    Some(match linked(reader, cursor)? {
-        Linked::Gain(gain, control) => Element::Vccs { gain, control },
-        Linked::Law(law) => Element::BehaviouralCurrent { law },
-    })
-}
-
-/// `TABLE {x} = (x0, y0) (x1, y1) …`; brackets, `=` and commas may be missing.
-fn table(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
-    let x = reader.value(cursor, "the expression of the table")?;
-    cursor.take(b'=');
-    let (mut points, from) = (vec![], cursor.at);
-    cursor.loose();
-    while !cursor.is_done() {
-        points.push(reader.value(cursor, "a number")?.as_number());
-        cursor.loose();
-    }
-    let points: Option<Vec<f64>> = points.into_iter().collect();
-    match points.and_then(|points| expression::table(&points)) {
-        Some(table) => {
-            let span = x.span;
-            Some(Expr::new(Node::Table(x, Arc::new(table)), span))
-        }
-        None => {
-            let span = cursor.span(reader, from, cursor.text.len());
-            let message = "a table takes pairs of numbers with rising abscissae";
-            reader.diagnostics.push(Diagnostic::error("E0706", span, message));
-            None
-        }
-    }
-}
-
-/// A law: `{…}`, `'…'`, or the rest of the line as it stands.
-fn law(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
-    let (rest, from) = cursor.rest();
-    let to = from + rest.len();
-    if rest.is_empty() {
-        reader.missing(cursor, "the expression");
-        return None;
-    }
-    cursor.at = cursor.text.len();
-    reader.grouped(cursor, from, to)
-}
-
-fn control(reader: &mut Reader, cursor: &mut Cursor) -> Option<Name> {
-    let (word, from) = cursor.node();
-    if word.is_empty() {
-        reader.missing(cursor, "the name of the controlling device");
-        return None;
-    }
-    if word.eq_ignore_ascii_case("poly") {
-        let span = cursor.span(reader, from, from + word.len());
-        reader.diagnostics.push(
-            Diagnostic::error("E0702", span, "polynomials are not read yet")
-                .help("write a B source with i(device)"),
-        );
-        return None;
-    }
-    Some(reader.name((word, from)))
-}
-
-fn cccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let control = control(reader, cursor)?;
-    Some(Element::Cccs { gain: reader.value(cursor, "the gain")?, control })
-}
-
-fn ccvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let control = control(reader, cursor)?;
-    Some(Element::Ccvs { gain: reader.value(cursor, "the gain")?, control })
-}
-
-fn behavioural(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let here = cursor.here(reader);
-    match cursor.key() {
-        Some(("v" | "V", _)) => Some(Element::BehaviouralVoltage { law: law(reader, cursor)? }),
-        Some(("i" | "I", _)) => Some(Element::BehaviouralCurrent { law: law(reader, cursor)? }),
-        _ => {
-            reader.diagnostics.push(Diagnostic::error("E0703", here, "`V=` or `I=` is missing"));
-            cursor.at = cursor.text.len();
-            None
-        }
-    }
 }
 
 fn model(reader: &mut Reader, cursor: &mut Cursor) -> Option<Name> {
@@ -322,7 +144,11 @@ fn state(cursor: &mut Cursor) -> Option<bool> {
     on
 }
 
+/// `c+ c- model`, or `model CONTROL={expression}`; ON or OFF anywhere behind.
 fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+    if let Some(element) = law_switch(reader, cursor)? {
+        return Some(element);
+    }
     let first = reader.node(cursor, "the first controlling node")?;
     let second = reader.node(cursor, "the second controlling node")?;
     Some(Element::Switch {
@@ -333,8 +159,30 @@ fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option
 }
 
 fn current_switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
-    let control = control(reader, cursor)?;
+    if let Some(element) = law_switch(reader, cursor)? {
+        return Some(element);
+    }
+    let control = linked::control(reader, cursor)?;
     Some(Element::CurrentSwitch { model: model(reader, cursor)?, control, on: state(cursor) })
+}
+
+/// A switch by an expression, if the card has one.
+fn law_switch(reader: &mut Reader, cursor: &mut Cursor) -> Option<Option<Element>> {
+    let mut ahead = *cursor;
+    let mut words = 0;
+    while words < 3 && ahead.clone().key().is_none() && !ahead.is_done() {
+        ahead.node();
+        words += 1;
+    }
+    if !ahead.key().is_some_and(|(key, _)| key.eq_ignore_ascii_case("control")) {
+        return Some(None);
+    }
+    let model = model(reader, cursor)?;
+    let before = state(cursor);
+    cursor.key();
+    let control = passive::law(reader, cursor, "the expression")?;
+    let on = before.or(state(cursor));
+    Some(Some(Element::LawSwitch { model, control, on }))
 }
 
 /// Z0 and TD, or F and NL (a quarter of a wave where it is left out): TD = NL/F.
@@ -383,14 +231,18 @@ fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Opti
 
 fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
     let model = model(reader, cursor)?;
-    let mut area = None;
+    let (mut area, mut parameters) = (None, vec![]);
     while !cursor.is_done() {
+        let span = cursor.here(reader);
         let key = cursor.key().map(|(word, _)| word.to_ascii_lowercase());
         match key.as_deref() {
             Some("area") => area = Some(reader.value(cursor, "the area")?),
+            Some(key @ ("pj" | "m" | "temp" | "dtemp" | "ic")) => {
+                let value = reader.value(cursor, "the value of the parameter")?;
+                parameters.push((key.to_string(), value));
+            }
             Some(other) => {
                 let message = format!("`{other}=` of a diode is not read");
-                let span = cursor.here(reader);
                 reader.diagnostics.push(Diagnostic::error("E0704", span, message));
                 return None;
             }
@@ -402,7 +254,7 @@ fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<
             None => break,
         }
     }
-    Some(Element::Diode { model, area, parameters: vec![] })
+    Some(Element::Diode { model, area, parameters })
 }
 
 fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {

@@ -1,5 +1,6 @@
 //! Expressions of netlists, by the shared grammar with SPICE's leaves.
 
+use super::calls;
 use super::cursor::node_name;
 use super::functions::Calls;
 use super::number;
@@ -221,7 +222,8 @@ impl Language for Spice<'_> {
     fn call(&mut self, name: &str, pair: Pair<'_, Rule>, d: &mut Vec<Diagnostic>) -> Option<Expr> {
         let span = self.span(pair.as_span());
         let folded = name.to_ascii_lowercase();
-        if folded != "table" && folded != "pwl" && self.calls.is_none() {
+        let row = calls::find(&folded);
+        if row.is_none() && folded != "table" && folded != "pwl" && self.calls.is_none() {
             d.push(parse::unknown_function(name, span));
             return None;
         }
@@ -229,6 +231,9 @@ impl Language for Spice<'_> {
         for part in pair.into_inner().filter(|part| Self::role(part.as_rule()) == Role::Expression)
         {
             arguments.push(parse::expression(self, part, d)?);
+        }
+        if let Some(row) = row {
+            return calls::apply(row, arguments, span, d);
         }
         if folded != "table" && folded != "pwl" {
             let leaf = self.calls.as_mut()?.add(self.names, name, arguments, span);

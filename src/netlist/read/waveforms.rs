@@ -53,8 +53,10 @@ pub fn source(reader: &mut Reader, cursor: &mut Cursor) -> Option<Source> {
             cursor.word();
             cursor.take(b'=');
             ac = Some(phasor(reader, cursor)?);
-        } else if let Some(row) = WAVEFORMS.iter().find(|row| row.name.eq_ignore_ascii_case(word)) {
-            function = Some(arguments(reader, cursor, row)?);
+        } else if word.eq_ignore_ascii_case(PATTERN) {
+            function = Some(pattern(reader, cursor)?);
+        } else if let Some(row) = find(word) {
+            function = Some(waveform(reader, cursor, row)?);
         } else if dc.is_none() && function.is_none() {
             dc = Some(reader.value(cursor, "the value")?);
         } else {
@@ -75,9 +77,7 @@ fn phasor(reader: &mut Reader, cursor: &mut Cursor) -> Option<[Expr; 2]> {
     let mut parts = [Expr::number(1.0), Expr::number(0.0)];
     for (part, what) in parts.iter_mut().zip(["the magnitude", "the phase"]) {
         let word = cursor.next_word();
-        let keyword = ["dc", "ac"].iter().any(|key| key.eq_ignore_ascii_case(word))
-            || WAVEFORMS.iter().any(|row| row.name.eq_ignore_ascii_case(word));
-        if cursor.is_done() || keyword || cursor.clone().key().is_some() {
+        if cursor.is_done() || is_keyword(word) || cursor.clone().key().is_some() {
             break;
         }
         *part = reader.value(cursor, what)?;
@@ -85,51 +85,129 @@ fn phasor(reader: &mut Reader, cursor: &mut Cursor) -> Option<[Expr; 2]> {
     Some(parts)
 }
 
-fn arguments(reader: &mut Reader, cursor: &mut Cursor, row: &Row) -> Option<Waveform> {
-    let (_, from) = cursor.word();
-    let (mut arguments, mut depth) = (vec![], 0);
+/// What a pattern of bits is called; its arguments.
+const PATTERN: &str = "pat";
+const PATTERN_ARGUMENTS: &str = "PAT(vhi vlo td tr tf tsample b0101) [R=times]";
+
+/// The row of a name.
+fn find(word: &str) -> Option<&'static Row> {
+    let word = if word.eq_ignore_ascii_case("sine") { "sin" } else { word };
+    WAVEFORMS.iter().find(|row| row.name.eq_ignore_ascii_case(word))
+}
+
+/// Whether a word of a source's card means more than a value.
+fn is_keyword(word: &str) -> bool {
+    ["dc", "ac", PATTERN].iter().any(|key| key.eq_ignore_ascii_case(word)) || find(word).is_some()
+}
+
+/// Arguments, with or without brackets, and what has a key among or behind them.
+struct Arguments {
+    from: usize,
+    values: Vec<Expr>,
+    bits: Option<String>,
+    keyed: Vec<(String, Expr)>,
+}
+
+fn arguments(reader: &mut Reader, cursor: &mut Cursor, keys: &[&str]) -> Option<Arguments> {
+    let (name, from) = cursor.word();
+    let mut found = Arguments { from, values: vec![], bits: None, keyed: vec![] };
+    let (mut depth, mut closed) = (0, false);
     loop {
         cursor.blanks();
+        let mut ahead = *cursor;
+        let key = ahead.key().map(|(word, _)| word.to_ascii_lowercase());
         match cursor.peek() {
-            Some(b'(') => {
+            _ if key.as_deref().is_some_and(|key| keys.contains(&key)) => {
+                *cursor = ahead;
+                let value = reader.value(cursor, "the value of the parameter")?;
+                found.keyed.extend(key.map(|key| (key, value)));
+            }
+            Some(b'(') if !closed => {
                 depth += 1;
                 cursor.at += 1;
             }
             Some(b')') if depth > 0 => {
                 depth -= 1;
                 cursor.at += 1;
-                if depth == 0 {
-                    break;
-                }
+                closed = depth == 0;
             }
             None if depth > 0 => {
-                let span = cursor.span(reader, from, from + row.name.len());
+                let span = cursor.span(reader, from, from + name.len());
                 let error =
                     Diagnostic::error("E0704", span, "the bracket of the waveform is not closed");
                 reader.diagnostics.push(error);
                 return None;
             }
             None => break,
-            // `r=` and `td=` of PWL come after its arguments.
-            _ if depth == 0 && cursor.clone().key().is_some() => break,
-            _ => arguments.push(reader.value(cursor, "a number")?),
+            _ if closed || (depth == 0 && (key.is_some() || is_keyword(cursor.next_word()))) => {
+                break;
+            }
+            _ => {
+                let word = cursor.next_word();
+                let bits = word.strip_prefix(['b', 'B']).filter(|bits| {
+                    !bits.is_empty() && bits.bytes().all(|byte| matches!(byte, b'0' | b'1'))
+                });
+                match bits.filter(|_| name.eq_ignore_ascii_case(PATTERN)) {
+                    Some(bits) => {
+                        cursor.word();
+                        found.bits = Some(bits.to_string());
+                    }
+                    None => found.values.push(reader.value(cursor, "a number")?),
+                }
+            }
         }
     }
-    let most = if row.shape == Shape::Pwl { usize::MAX } else { row.arguments.len() };
-    let odd = row.shape == Shape::Pwl && arguments.len() % 2 == 1;
-    if odd || arguments.len() < row.least || arguments.len() > most {
-        let span = cursor.span(reader, from, cursor.at.min(cursor.text.len()));
+    Some(found)
+}
+
+impl Arguments {
+    fn take(&mut self, key: &str) -> Option<Expr> {
+        let k = self.keyed.iter().position(|(own, _)| own == key)?;
+        Some(self.keyed.swap_remove(k).1)
+    }
+}
+
+fn waveform(reader: &mut Reader, cursor: &mut Cursor, row: &Row) -> Option<Waveform> {
+    let lines = row.shape == Shape::Pwl;
+    let keys: &[&str] = if lines { &["r", "td"] } else { &[] };
+    let mut found = arguments(reader, cursor, keys)?;
+    let count = found.values.len();
+    let most = if lines { usize::MAX } else { row.arguments.len() };
+    if (lines && count % 2 == 1) || count < row.least || count > most {
+        let span = cursor.span(reader, found.from, cursor.at.min(cursor.text.len()));
         let name = row.name.to_uppercase();
-        let message = if row.shape == Shape::Pwl {
+        let message = if lines {
             "PWL takes pairs of a time and a value".to_string()
         } else {
             format!("{name} takes {} to {} numbers", row.least, row.arguments.len())
         };
         let error = Diagnostic::error("E0707", span, message)
-            .says(format!("{} given", arguments.len()))
+            .says(format!("{count} given"))
             .help(format!("{name}({})", row.arguments.join(" ")));
         reader.diagnostics.push(error);
         return None;
     }
-    Some(Waveform::Function { shape: row.shape, arguments })
+    let (repeat, delay) = (found.take("r"), found.take("td"));
+    if repeat.is_some() || delay.is_some() {
+        return Some(Waveform::Points { points: found.values, repeat, delay });
+    }
+    Some(Waveform::Function { shape: row.shape, arguments: found.values })
+}
+
+fn pattern(reader: &mut Reader, cursor: &mut Cursor) -> Option<Waveform> {
+    let mut found = arguments(reader, cursor, &["r"])?;
+    let repeat = found.take("r");
+    match (found.bits, found.values.len()) {
+        (Some(bits), 6) => Some(Waveform::Pattern { arguments: found.values, bits, repeat }),
+        (bits, count) => {
+            let span = cursor.span(reader, found.from, cursor.at.min(cursor.text.len()));
+            let message = match bits {
+                Some(_) => "PAT takes 6 numbers before its bits",
+                None => "PAT takes bits: a `b` with noughts and ones behind it",
+            };
+            let error = Diagnostic::error("E0772", span, message).says(format!("{count} given"));
+            reader.diagnostics.push(error.help(PATTERN_ARGUMENTS));
+            None
+        }
+    }
 }
