@@ -385,6 +385,7 @@ impl<'a> Builder<'a> {
             initial_holds: stamps.initial_holds,
             curved: self.curved,
             held: self.dependent.iter().map(|dependent| !dependent).collect(),
+            pinned: stamps.charges.iter().map(|charge| charge.pinned).collect(),
             groups,
             sources: stamps
                 .sources

@@ -121,8 +121,11 @@ pub(crate) fn operating_point(
     let result = settle_modes(network, state, slides, |network, state| {
         tied.clear();
         let stated = network.system.initial_charges.iter().zip(&network.system.held);
-        for (held, (initial, state)) in held.iter_mut().zip(stated) {
-            *held = network.system.initial_holds && *state && initial.is_some();
+        for ((held, (initial, state)), pinned) in
+            held.iter_mut().zip(stated).zip(&network.system.pinned)
+        {
+            let stated = network.system.initial_holds && initial.is_some();
+            *held = *state && (stated || *pinned);
         }
         begin_at_guesses(network, &held, &targets, floors, state, scratch);
         loop {

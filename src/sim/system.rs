@@ -215,6 +215,8 @@ pub struct System {
     pub(crate) curved: Vec<bool>,
     /// Whether a charge is a state; the others follow from these.
     pub(crate) held: Vec<bool>,
+    /// Charges that an operating point holds at their initial values.
+    pub(crate) pinned: Vec<bool>,
     pub(crate) groups: Vec<LawGroup>,
     pub(crate) sources: Vec<Source>,
     pub(crate) memories: Vec<MemoryData>,

@@ -432,11 +432,21 @@ impl<'n> Expander<'n> {
 impl Flat<'_> {
     /// Whether a negative hysteresis means a smooth switch (LTspice).
     pub fn smooth_when_negative(&self) -> bool {
-        false
+        self.netlist.dialect.name == "ltspice"
+    }
+
+    /// Whether `r=`, `c=` and `l=` of models multiply values (PSpice and its kin), rather than being values.
+    pub fn models_multiply(&self) -> bool {
+        matches!(self.netlist.dialect.name, "xyce" | "ltspice")
+    }
+
+    /// Whether a rise or fall of 0 is a jump (Xyce), rather than one step of the run.
+    pub fn zero_is_jump(&self) -> bool {
+        self.netlist.dialect.name == "xyce"
     }
 
     /// Whether the knee of diodes is that of PSpice.
     pub fn knee_by_root(&self) -> bool {
-        false
+        self.models_multiply()
     }
 }

@@ -1,9 +1,9 @@
 //! The second pass: what each device is.
 
 use super::expand::{Flat, Pending};
-use super::scope;
 use super::models::{self, Key, Kind, OPEN};
 use super::passive;
+use super::scope;
 use super::sources::{self, Times};
 use super::values::Lookup;
 use crate::circuit::{

@@ -33,7 +33,8 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     usage::check(netlist, &header, diagnostics);
     let mut flat = expand::expand(netlist, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
-    let times = sources::Times::of(&analyses);
+    let zero_is_jump = flat.zero_is_jump();
+    let times = sources::Times { zero_is_jump, ..sources::Times::of(&analyses) };
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);

@@ -6,6 +6,7 @@
 //! value(T) = value·(1 + TC1·(T − TNOM) + TC2·(T − TNOM)²)
 //! C(age)   = C·(1 − D·log10(age in hours))
 //! M in parallel: R/M, M·C, L/M
+//! R, C and L of a model: the value of what says none; in Xyce and LTspice what every value is multiplied with
 //! ```
 //!
 //! Sources: ngspice manual, version 39, sections 3.2.2 to 3.2.12; Xyce Reference Guide, version 7, tables of R, C and L.
@@ -81,7 +82,11 @@ pub fn kind(
         Some(expr) => Some(lookup.number(pending.scope, expr, d)?),
         None => None,
     };
-    let factor = factor(lookup, passive.kind, &own, model);
+    let multiplies = lookup.flat.models_multiply();
+    // For resistors the key is `r`, for inductors `l`, for capacitors `c`.
+    let key = passive.kind.model();
+    let multiplier = model.and_then(|model| model.given(key)).filter(|_| multiplies).unwrap_or(1.0);
+    let factor = multiplier * factor(lookup, passive.kind, &own, model);
     let law = passive.value.as_ref().filter(|value| varies(value));
     if let Some(law) = law {
         let law = lookup.law(pending.scope, law, d)?;
@@ -93,7 +98,7 @@ pub fn kind(
     }
     let value = match &passive.value {
         Some(expr) => lookup.number(pending.scope, expr, d)?,
-        None => match geometry(passive.kind, &own, model) {
+        None => match geometry(passive.kind, &own, model, multiplies) {
             Some(value) => value,
             None => {
                 let name = lookup.flat.device_name(pending);
@@ -145,8 +150,14 @@ fn factor(lookup: &Lookup, kind: PassiveKind, own: &Values, model: Option<&Value
 }
 
 /// The value that a model gives: as it stands, or from length and width.
-fn geometry(kind: PassiveKind, own: &Values, model: Option<&Values>) -> Option<f64> {
+fn geometry(
+    kind: PassiveKind,
+    own: &Values,
+    model: Option<&Values>,
+    multiplies: bool,
+) -> Option<f64> {
     let model = model?;
+    let value = |key: &str| model.given(key).filter(|_| !multiplies);
     let width = || {
         let given = own.given("w").or_else(|| model.given("w")).or_else(|| model.given("defw"));
         given.unwrap_or(WIDTH) - model.get("narrow")
@@ -158,16 +169,16 @@ fn geometry(kind: PassiveKind, own: &Values, model: Option<&Values>) -> Option<f
     match kind {
         PassiveKind::Resistor => match (model.given("rsh"), length()) {
             (Some(sheet), Some(length)) => Some(sheet * length / width()),
-            _ => model.given("r"),
+            _ => value("r"),
         },
         PassiveKind::Capacitor => match (model.given("cj"), length()) {
             (Some(area), Some(length)) => {
                 let width = width();
                 Some(area * length * width + 2.0 * model.get("cjsw") * (length + width))
             }
-            _ => model.given("cap").or_else(|| model.given("c")),
+            _ => model.given("cap").or_else(|| value("c")),
         },
-        PassiveKind::Inductor => model.given("ind").or_else(|| model.given("l")),
+        PassiveKind::Inductor => model.given("ind").or_else(|| value("l")),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! | function | left out or 0 |
 //! |---|---|
-//! | PULSE | rise, fall: the step of `.tran`; width, period: its end |
+//! | PULSE | rise, fall: the step of `.tran` (for Xyce where left out only); width, period: its end |
 //! | SIN | frequency: 1 over the end of `.tran` |
 //! | EXP | delays and time constants: the step of `.tran`, the second delay one step after the first |
 //! | SFFM, AM | both frequencies: 1 over the end of `.tran` |
@@ -25,11 +25,13 @@ use crate::netlist::{Expr, Shape, Source, Waveform};
 pub struct Times {
     step: f64,
     stop: f64,
+    /// Whether a rise or fall of 0 is a jump.
+    pub zero_is_jump: bool,
 }
 
 impl Default for Times {
     fn default() -> Times {
-        Times { step: 0.0, stop: 1.0 }
+        Times { step: 0.0, stop: 1.0, zero_is_jump: false }
     }
 }
 
@@ -37,7 +39,9 @@ impl Times {
     /// Those of the last transient analysis; 0 and 1 s where there is none.
     pub fn of(analyses: &[Analysis]) -> Times {
         let transient = analyses.iter().rev().find_map(|analysis| match analysis {
-            Analysis::Transient { step, stop, .. } => Some(Times { step: *step, stop: *stop }),
+            Analysis::Transient { step, stop, .. } => {
+                Some(Times { step: *step, stop: *stop, ..Times::default() })
+            }
             Analysis::OperatingPoint => None,
         });
         transient.unwrap_or_default()
@@ -113,13 +117,17 @@ pub fn made(
         values.get(k).copied().filter(|value| *value != 0.0).unwrap_or(default)
     };
     let plain = |k: usize| or(k, 0.0);
+    let edge = |k: usize| match values.get(k) {
+        Some(0.0) if times.zero_is_jump => 0.0,
+        _ => or(k, times.step),
+    };
     match shape {
         Shape::Pulse => circuit::Waveform::Pulse {
             low: plain(0),
             high: plain(1),
             delay: plain(2),
-            rise: if jumps.is_some_and(|jumps| jumps.rise) { 0.0 } else { or(3, times.step) },
-            fall: if jumps.is_some_and(|jumps| jumps.fall) { 0.0 } else { or(4, times.step) },
+            rise: if jumps.is_some_and(|jumps| jumps.rise) { 0.0 } else { edge(3) },
+            fall: if jumps.is_some_and(|jumps| jumps.fall) { 0.0 } else { edge(4) },
             width: or(5, times.stop),
             period: or(6, 0.0),
         },

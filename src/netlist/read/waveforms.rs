@@ -117,7 +117,11 @@ fn arguments(reader: &mut Reader, cursor: &mut Cursor, keys: &[&str]) -> Option<
         let mut ahead = *cursor;
         let key = ahead.key().map(|(word, _)| word.to_ascii_lowercase());
         match cursor.peek() {
-            _ if key.as_deref().is_some_and(|key| keys.contains(&key)) => {
+            // A bracket that closes stands before what is behind it.
+            Some(byte)
+                if !matches!(byte, b'(' | b')')
+                    && key.as_deref().is_some_and(|key| keys.contains(&key)) =>
+            {
                 *cursor = ahead;
                 let value = reader.value(cursor, "the value of the parameter")?;
                 found.keyed.extend(key.map(|key| (key, value)));
