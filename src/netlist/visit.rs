@@ -49,6 +49,12 @@ fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut source.waveform {
         Waveform::Constant(value) => visit(value),
         Waveform::Function { arguments, .. } => arguments.iter_mut().for_each(&mut *visit),
+        Waveform::Points { points, repeat, delay } => {
+            points.iter_mut().chain(repeat).chain(delay).for_each(&mut *visit);
+        }
+        Waveform::Pattern { arguments, repeat, .. } => {
+            arguments.iter_mut().chain(repeat).for_each(&mut *visit);
+        }
     }
     source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
 }
@@ -74,8 +80,20 @@ fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
             initial.iter_mut().flatten().for_each(visit);
         }
         Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
+        Element::Charge { law, initial } | Element::Flux { law, initial } => {
+            visit(law);
+            initial.iter_mut().for_each(visit);
+        }
+        Element::Passive(passive) => {
+            passive.value.iter_mut().chain(&mut passive.initial).for_each(&mut *visit);
+            passive.parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
+        Element::LawSwitch { control, .. } => visit(control),
         Element::Switch { .. } | Element::CurrentSwitch { .. } => {}
-        Element::Diode { area, .. } => area.iter_mut().for_each(visit),
+        Element::Diode { area, parameters, .. } => {
+            area.iter_mut().for_each(&mut *visit);
+            parameters.iter_mut().for_each(|(_, value)| visit(value));
+        }
         Element::Instance { parameters, .. } => {
             parameters.iter_mut().for_each(|(_, value)| visit(value));
         }

@@ -128,9 +128,6 @@ fn kind(
             let parts = sources::parts(lookup, pending, source, d);
             DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
         }
-        Element::CurrentSource(Source { waveform: Waveform::Constant(law), .. }) if varies(law) => {
-            DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }
-        }
         Element::CurrentSource(source) => {
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);

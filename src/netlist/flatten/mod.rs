@@ -34,7 +34,8 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
     let mut flat = expand::expand(netlist, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
     let zero_is_jump = flat.zero_is_jump();
-    let times = sources::Times { zero_is_jump, ..sources::Times::of(&analyses) };
+    let mut times = sources::Times::of(&analyses);
+    times.zero_is_jump = zero_is_jump;
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);

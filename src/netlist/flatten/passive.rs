@@ -13,11 +13,11 @@
 
 use super::expand::Pending;
 use super::models::{self, Key, Kind, OPEN, Values};
+use super::scope;
 use super::values::Lookup;
 use crate::circuit::{self, DeviceKind, LawOf};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
-use crate::netlist::parts::varies;
 use crate::netlist::{Expr, Passive, PassiveKind};
 
 #[rustfmt::skip]
@@ -87,7 +87,8 @@ pub fn kind(
     let key = passive.kind.model();
     let multiplier = model.and_then(|model| model.given(key)).filter(|_| multiplies).unwrap_or(1.0);
     let factor = multiplier * factor(lookup, passive.kind, &own, model);
-    let law = passive.value.as_ref().filter(|value| varies(value));
+    let varies = |value: &&Expr| scope::varies(&lookup.flat.scopes, pending.scope, value);
+    let law = passive.value.as_ref().filter(varies);
     if let Some(law) = law {
         let law = lookup.law(pending.scope, law, d)?;
         let law = match factor == 1.0 {
