@@ -439,8 +439,6 @@ pub struct Circuit {
     pub watched: Vec<Expr>,
     /// `.options` and header options as (key, value), later ones win.
     pub options: Vec<(String, String)>,
-    /// Whether `IC=` of a storage holds in an operating point, too.
-    pub initial_holds: bool,
     /// Output grid (interval), where the header or the command line asks for one.
     pub grid: Option<f64>,
     /// What the devices, voltages and currents are called in the text that the circuit was made of.

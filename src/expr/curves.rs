@@ -265,8 +265,9 @@ mod tests {
 
     #[test]
     fn smooth_curves_follow_what_they_pass_through() {
-        // The error of cubics on sin(1.3 x) with h = 0.7: (1.3·0.7)⁴·5/384 = 9e-3 within; the polynomial's far less.
-        for (table, error) in curves().into_iter().skip(1).zip([2e-2, 1e-2, 1e-3]) {
+        // Lines on sin(1.3 x) with h = 0.7 err by (1.3·0.7)²/8 = 0.1, Akima's curve by half of that at most; splines by
+        // (1.3·0.7)⁴·5/384 = 9e-3, twice that with the natural ends near; the polynomial by far less.
+        for (table, error) in curves().into_iter().skip(1).zip([5e-2, 2e-2, 1e-3]) {
             let worst = (0..30)
                 .map(|k| 0.5 + 0.1 * f64::from(k))
                 .map(|x| (table.value(x) - (1.3 * x).sin()).abs())

@@ -106,7 +106,7 @@ mod tests {
         let x = || Expr::leaf(());
         let number = Expr::<()>::number;
         let call = |function, arguments| Expr::call(function, arguments);
-        let table = Table { x: vec![-1.0, 0.0, 2.0], y: vec![3.0, 1.0, 2.0] };
+        let table = Table::lines(vec![-1.0, 0.0, 2.0], vec![3.0, 1.0, 2.0]);
         for law in [
             x() * x() - number(3.0) / x(),
             -(x() + number(2.0)).binary(Binary::Power, number(3.0)),

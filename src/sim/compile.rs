@@ -235,8 +235,7 @@ impl<'a> Builder<'a> {
         let mut curved_charges = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
-                let all = dag.inputs_of(law.node);
-                let inputs = all.into_iter().filter(|input| *input < n as u32);
+                let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
                 match &law.target {
                     Target::Equations(into) => {
                         lawful.extend(into.iter().map(|(row, _)| *row));

@@ -12,6 +12,8 @@ use super::settings::{Interval, Settings};
 use crate::trace::Sink;
 use std::io;
 
+/// Corrections of one row at most: an exponential that the guess overshoots comes down by one n·Vt each time.
+const MOST_CORRECTIONS: u32 = 40;
 /// How often a step is halved for straight lines at most.
 const MOST_HALVED: u32 = 8;
 
@@ -475,7 +477,7 @@ impl Inside {
         if self.factorised.is_none() {
             self.factorised = Some(network.factorise_frozen(held).is_ok());
         }
-        for iteration in 0..6 {
+        for iteration in 0..MOST_CORRECTIONS {
             if self.factorised != Some(true) || iteration >= 2 {
                 // The slopes of the step's start no longer serve.
                 network.linearise(x, time, false);

@@ -39,7 +39,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     if !stamper.finite(id, &[("initial voltage", given.unwrap_or(0.0))]) {
         return;
     }
-    let holds = stamper.circuit.initial_holds && initial.is_some();
     let leaving = stamper.leaving(stamper.ends(id));
     match (law_of, stamper.hidden(id, 0)) {
         (LawOf::Factor, Some(rate)) => {
@@ -50,7 +49,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
                 charge.linear = leaving;
                 charge.into = vec![(rate, -1.0)];
                 charge.initial = given;
-                charge.pinned = holds;
             }
         }
         _ => {
@@ -61,7 +59,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             };
             if let Some(charge) = stamper.charge_mut(id) {
                 charge.initial = start;
-                charge.pinned = holds;
                 charge.law = Some(stored);
                 charge.into = leaving;
             }

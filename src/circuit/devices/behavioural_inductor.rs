@@ -38,7 +38,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     if !stamper.finite(id, &[("initial current", initial.unwrap_or(0.0))]) {
         return;
     }
-    let holds = stamper.circuit.initial_holds && initial.is_some();
     let Some(branch) = stamper.branch(id) else { return };
     let ends = stamper.ends(id);
     stamper.through(id, branch);
@@ -53,7 +52,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
                 flux.linear = vec![(branch, 1.0)];
                 flux.into = vec![(rate, -1.0)];
                 flux.initial = *initial;
-                flux.pinned = holds;
             }
         }
         _ => {
@@ -63,7 +61,6 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             };
             if let Some(flux) = stamper.charge_mut(id) {
                 flux.initial = start;
-                flux.pinned = holds;
                 flux.law = Some(law);
                 flux.into = vec![(branch, -1.0)];
             }

@@ -2,8 +2,6 @@
 //!
 //! Under `uic` it starts with C·IC, or with what `.ic` says of its nodes where it has no `IC=` of its own.
 //!
-//! Where the circuit says that initial values hold, an operating point has its `IC=` as well.
-//!
 //! Source: L. W. Nagel, SPICE2, UCB/ERL M520, 1975, section 3.
 
 use super::{Needs, Row};
@@ -32,14 +30,12 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     {
         return;
     }
-    let holds = stamper.circuit.initial_holds;
     let leaving = stamper.leaving(stamper.ends(id));
     if let Some(charge) = stamper.charge_mut(id) {
         charge.linear =
             leaving.iter().map(|(unknown, sign)| (*unknown, sign * capacitance)).collect();
         charge.into = leaving;
         charge.initial = given.map(|voltage| capacitance * voltage);
-        charge.pinned = holds && initial.is_some();
     }
 }
 

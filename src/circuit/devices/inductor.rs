@@ -27,14 +27,12 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let ends = stamper.ends(id);
     stamper.through(id, branch);
     stamper.difference(Some(branch), ends, 1.0);
-    let holds = stamper.circuit.initial_holds;
     if let Some(flux) = stamper.charge_mut(id) {
         flux.linear.insert(0, (branch, inductance));
         flux.into.push((branch, -1.0));
         // A coupling may have written its part before.
         if let Some(current) = initial {
             flux.initial = Some(flux.initial.unwrap_or(0.0) + inductance * current);
-            flux.pinned = holds;
         }
     }
 }

@@ -263,6 +263,7 @@ pub(crate) mod testing {
             Node::Leaf(Leaf::Time) => t,
             Node::Leaf(Leaf::Mode(k)) => modes[*k as usize],
             Node::Unary(Unary::Negate, a) => -of(a),
+            Node::Unary(Unary::Not, a) => f64::from(of(a) == 0.0),
             Node::Binary(op, a, b) => {
                 let (a, b) = (of(a), of(b));
                 match op {

@@ -79,7 +79,6 @@ pub fn flatten_with(
         watched,
         options,
         grid: header.grid,
-        initial_holds: netlist.dialect.reading().initial_holds,
         ..Circuit::default()
     };
     experiment::scales(&mut circuit, &header, diagnostics);

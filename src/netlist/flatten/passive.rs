@@ -87,8 +87,8 @@ pub fn kind(
     let key = passive.kind.model();
     let multiplier = model.and_then(|model| model.given(key)).filter(|_| multiplies).unwrap_or(1.0);
     let factor = multiplier * factor(lookup, passive.kind, &own, model);
-    let law =
-        passive.value.as_ref().filter(|v| scope::varies(&lookup.flat.scopes, pending.scope, v));
+    let varies = |value: &&Expr| scope::varies(&lookup.flat.scopes, pending.scope, value);
+    let law = passive.value.as_ref().filter(varies);
     if let Some(law) = law {
         let law = lookup.law(pending.scope, law, d)?;
         let law = match factor == 1.0 {

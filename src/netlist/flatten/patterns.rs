@@ -7,7 +7,7 @@
 //!
 //! A bit lasts `sample`. The pattern stands still in the first bit until `delay`; from one bit to a different one the value
 //! goes over in `rise` or `fall`, half of it before the end of the bit. After the last bit the pattern comes again n times,
-//! for ever with a negative n, else the last bit stays. Units: s.
+//! for ever with n = −1, else the last bit stays. Units: s.
 //!
 //! Source: Xyce Reference Guide, version 7, independent voltage source (PWL, PAT).
 
@@ -52,8 +52,8 @@ pub fn pattern(values: &[f64], bits: &str, repeat: Option<f64>) -> Result<Wavefo
         return Err("it has no bits");
     };
     let period = sample * bits.len() as f64;
-    let forever = repeat.is_some_and(|n| n < 0.0);
-    let times = if forever { 2 } else { repeat.unwrap_or(0.0).trunc() as usize + 1 };
+    let forever = repeat == Some(-1.0);
+    let times = if forever { 2 } else { repeat.unwrap_or(0.0).max(0.0).trunc() as usize + 1 };
     if times > MOST {
         return Err("it is repeated too often: write R=-1 for ever");
     }

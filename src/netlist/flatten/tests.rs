@@ -231,7 +231,7 @@ fn errors_have_codes_and_helps() {
         ("r1 a 0 {nowhere}\nr2 a 0 1", "E0733", Some("define it: .param nowhere=…")),
         (".param a={b} b={c} c={a}\nr1 x 0 {a}\nr2 x 0 1", "E0731", None),
         (
-            "r1 a 0 {v(a)}\nr2 a 0 1",
+            "e1 a 0 a 0 {v(a)}\nr2 a 0 1",
             "E0732",
             Some("what follows a voltage, a current or time is a B source: V={…} or I={…}"),
         ),

@@ -264,6 +264,9 @@ impl Reader<'_> {
             let span = cursor.span(self, start, start + trimmed.len());
             return Some(Expr::new(Node::Number(read.value), span));
         }
+        if text.contains("(\"") {
+            return self.with_files(cursor, from, to);
+        }
         super::expression::with_calls(
             text,
             &mut self.names,

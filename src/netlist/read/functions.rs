@@ -8,6 +8,7 @@ use super::Reader;
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{MAX_DEPTH, too_deep, unknown_function};
 use crate::expr::slope::slope;
+use crate::netlist::parts::{every_leaf, map_leaves};
 use crate::netlist::visit::expressions_mut;
 use crate::netlist::{Card, CardKind, Definition, Expr, Leaf, Name, Names, Netlist};
 use crate::quantity::nearest;
@@ -63,7 +64,7 @@ impl Calls {
     /// A body with other names for its arguments, in the calls within it (those from `since` on), too.
     pub fn rename(&mut self, since: usize, body: &Expr, names: &[(Name, Name)]) -> Expr {
         let renamed = |expr: &Expr| {
-            expr.map(&mut |leaf, span| {
+            map_leaves(expr, &mut |leaf, span| {
                 let other = match leaf {
                     Leaf::Parameter(name) => names.iter().find(|(own, _)| own == name),
                     _ => None,
@@ -121,7 +122,7 @@ impl Resolver<'_> {
         for card in cards {
             expressions_mut(card, &mut |expr| {
                 let mut calls = false;
-                expr.leaves(&mut |leaf, _| calls |= self.call(leaf).is_some());
+                every_leaf(expr, &mut |leaf, _| calls |= self.call(leaf).is_some());
                 if calls {
                     *expr = self.expr(expr);
                 }
@@ -145,7 +146,7 @@ impl Resolver<'_> {
 
     /// The expression without calls. What is wrong in it has been said, and is NaN.
     fn expr(&mut self, expr: &Expr) -> Expr {
-        expr.map(&mut |leaf, span| {
+        map_leaves(expr, &mut |leaf, span| {
             let known = match leaf {
                 Leaf::Parameter(name) => self.calls.get(name),
                 _ => None,
@@ -192,7 +193,7 @@ impl Resolver<'_> {
         self.chain.push(call.function);
         let body = self.expr(&function.body);
         self.chain.pop();
-        let body = body.map(&mut |leaf, span| {
+        let body = map_leaves(&body, &mut |leaf, span| {
             let argument = match leaf {
                 Leaf::Parameter(name) => function.arguments.iter().position(|own| own == name),
                 _ => None,

@@ -15,6 +15,7 @@ pub mod number;
 pub mod cursor;
 pub mod expression;
 pub mod calls;
+mod files;
 pub mod waveforms;
 pub mod passive;
 pub mod linked;

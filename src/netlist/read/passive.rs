@@ -29,11 +29,18 @@ pub fn read(
     while !cursor.is_done() {
         let here = *cursor;
         let Some((word, from)) = cursor.key() else {
-            words.push(reader.value(cursor, what)?);
-            if words.len() > 2 {
+            // Behind a number only the name of a model may stand.
+            let named = cursor.next_word().starts_with(|c: char| c.is_alphabetic() || c == '_');
+            let full = match words.as_slice() {
+                [] => false,
+                [first] => name(first).is_none() && !named,
+                _ => true,
+            };
+            if full {
                 *cursor = here;
                 break;
             }
+            words.push(reader.value(cursor, what)?);
             continue;
         };
         let key = word.to_ascii_lowercase();

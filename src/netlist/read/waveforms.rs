@@ -2,6 +2,7 @@
 
 use super::{Cursor, Reader};
 use crate::diagnostic::Diagnostic;
+use crate::expr::Node;
 use crate::netlist::{Expr, Shape, Source, Waveform};
 
 /// One row of the table.
@@ -109,7 +110,17 @@ struct Arguments {
 }
 
 fn arguments(reader: &mut Reader, cursor: &mut Cursor, keys: &[&str]) -> Option<Arguments> {
-    let (name, from) = cursor.word();
+    let word = cursor.word();
+    behind(reader, cursor, word, keys)
+}
+
+/// The same behind the name.
+fn behind(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    (name, from): (&str, usize),
+    keys: &[&str],
+) -> Option<Arguments> {
     let mut found = Arguments { from, values: vec![], bits: None, keyed: vec![] };
     let (mut depth, mut closed) = (0, false);
     loop {
@@ -171,10 +182,51 @@ impl Arguments {
     }
 }
 
+/// The points of `PWL FILE name`, if the card names a file.
+fn file(reader: &mut Reader, cursor: &mut Cursor) -> Option<Option<Vec<Expr>>> {
+    let mut ahead = *cursor;
+    ahead.word();
+    ahead.loose();
+    if !ahead.next_word().eq_ignore_ascii_case("file") {
+        return None;
+    }
+    let (_, at) = ahead.word();
+    let here = Cursor { at, ..*cursor };
+    ahead.blanks();
+    let quote = ahead.peek().filter(|byte| matches!(byte, b'"' | b'\''));
+    let from = ahead.at + usize::from(quote.is_some());
+    let rest = &ahead.text[from..];
+    let length = match quote {
+        Some(quote) => rest.bytes().position(|byte| byte == quote).unwrap_or(rest.len()),
+        None => rest.find([' ', '\t', ')']).unwrap_or(rest.len()),
+    };
+    let name = rest[..length].to_string();
+    let span = ahead.span(reader, from, from + length.max(1));
+    let end = (from + length + usize::from(quote.is_some())).min(cursor.text.len());
+    *cursor = Cursor { at: end, ..here };
+    cursor.take(b')');
+    if name.is_empty() {
+        reader.missing(&here, "the name of the file");
+        return Some(None);
+    }
+    let numbers = reader.numbers_of(&name, span);
+    Some(numbers.map(|numbers| {
+        numbers.into_iter().map(|value| Expr::new(Node::Number(value), span)).collect()
+    }))
+}
+
 fn waveform(reader: &mut Reader, cursor: &mut Cursor, row: &Row) -> Option<Waveform> {
     let lines = row.shape == Shape::Pwl;
     let keys: &[&str] = if lines { &["r", "td"] } else { &[] };
-    let mut found = arguments(reader, cursor, keys)?;
+    let start = cursor.at;
+    let mut found = match lines.then(|| file(reader, cursor)).flatten() {
+        Some(points) => {
+            let mut found = behind(reader, cursor, (row.name, start), keys)?;
+            found.values = points?;
+            found
+        }
+        None => arguments(reader, cursor, keys)?,
+    };
     let count = found.values.len();
     let most = if lines { usize::MAX } else { row.arguments.len() };
     if (lines && count % 2 == 1) || count < row.least || count > most {

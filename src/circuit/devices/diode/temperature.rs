@@ -146,7 +146,8 @@ mod tests {
         let ratio: f64 = 400.15 / 300.15;
         let expected = 1e-14 * ratio.powi(3) * ((ratio - 1.0) * 1.11 / vt).exp();
         assert!((diode.saturation / expected - 1.0).abs() < 1e-9);
-        assert!(diode.depletion.potential < 0.85 && diode.depletion.potential > 0.7);
+        // By the header's formula: P(400.15 K) + 400.15/300.15·(1 − P(300.15 K)).
+        assert!((diode.depletion.potential - 0.9022907731).abs() < 1e-6);
     }
 
     #[test]
