@@ -425,8 +425,10 @@ pub struct Circuit {
     pub initial: Vec<(NodeId, f64)>,
     /// Where to look for an operating point: `.nodeset`.
     pub guesses: Vec<(NodeId, f64)>,
-    /// Where the search for an operating point begins: node voltages that follow from sources alone.
+    /// Node voltages that follow from sources alone, where Newton's method begins.
     pub starts: Vec<(NodeId, f64)>,
+    /// Whether the initial values of devices hold in the operating point, too.
+    pub initial_holds: bool,
     /// What is to be computed, in netlist order.
     pub analyses: Vec<Analysis>,
     /// Everything is computed at each of these values; the first axis runs fastest.

@@ -202,11 +202,11 @@ impl<'a> Stamper<'a> {
             let unknown = |(node, value): &(NodeId, f64)| Some((self.node(*node)?, *value));
             values.iter().filter_map(unknown).collect()
         };
-        (self.stamps.initial, self.stamps.guesses, self.stamps.starts) = (
-            of_nodes(&self.circuit.initial),
-            of_nodes(&self.circuit.guesses),
-            of_nodes(&self.circuit.starts),
-        );
+        let starts = of_nodes(&self.circuit.starts);
+        (self.stamps.initial, self.stamps.guesses) =
+            (of_nodes(&self.circuit.initial), of_nodes(&self.circuit.guesses));
+        self.stamps.starts = starts;
+        self.stamps.initial_holds = self.circuit.initial_holds;
         self.stamps.spoken = self.circuit.spoken.clone();
         self.stamps
     }

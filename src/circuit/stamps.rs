@@ -198,8 +198,10 @@ pub struct Stamps {
     pub initial: Vec<(UnknownId, f64)>,
     /// Node voltages of `.nodeset`, from which the search for an operating point begins.
     pub guesses: Vec<(UnknownId, f64)>,
-    /// Node voltages that the search begins with for want of anything better.
+    /// Node voltages that follow from sources alone, where Newton's method begins.
     pub starts: Vec<(UnknownId, f64)>,
+    /// Whether charges that cards state are held while the operating point is sought.
+    pub initial_holds: bool,
     /// Names and places, indexed by [`DeviceId`].
     pub devices: Vec<DeviceLabel>,
 }

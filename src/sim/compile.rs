@@ -405,6 +405,7 @@ impl<'a> Builder<'a> {
             initial: stamps.initial.iter().map(|(node, value)| (node.0, *value)).collect(),
             guesses: stamps.guesses.iter().map(|(node, value)| (node.0, *value)).collect(),
             starts: stamps.starts.iter().map(|(node, value)| (node.0, *value)).collect(),
+            initial_holds: stamps.initial_holds,
             curved: self.curved,
             held: self.dependent.iter().map(|dependent| !dependent).collect(),
             pinned: stamps.charges.iter().map(|charge| charge.pinned).collect(),

@@ -115,7 +115,7 @@ pub(crate) fn operating_point(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let targets = state.q.clone();
-    for (unknown, value) in &network.system.starts {
+    for (unknown, value) in network.system.starts.iter().chain(&network.system.initial) {
         state.x[*unknown as usize] = *value;
     }
     network.pins.clone_from(&network.system.initial);

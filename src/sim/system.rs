@@ -212,8 +212,10 @@ pub struct System {
     pub(crate) initial: Vec<(u32, f64)>,
     /// Node voltages of `.nodeset`.
     pub(crate) guesses: Vec<(u32, f64)>,
-    /// Node voltages that follow from sources alone.
+    /// Node voltages that follow from sources alone, where Newton's method begins.
     pub(crate) starts: Vec<(u32, f64)>,
+    /// Whether stated charges are held in the operating point.
+    pub(crate) initial_holds: bool,
     /// Whether a charge has a non-linear part.
     pub(crate) curved: Vec<bool>,
     /// Whether a charge is a state; the others follow from these.

@@ -9,8 +9,8 @@ use crate::circuit::{Device, DeviceKind, Expr, Leaf, NodeId};
 /// Rounds of following, at most; a chain that is written backwards takes one for each of its sources.
 const ROUNDS: usize = 30;
 
-/// What follows from sources, at t = 0, and from the guesses of `.nodeset`.
-pub fn starts(devices: &[Device], nodes: usize, guesses: &[(NodeId, f64)]) -> Vec<(NodeId, f64)> {
+/// What follows from sources, at t = 0, and from the guesses that are given.
+pub fn follow(devices: &[Device], nodes: usize, guesses: &[(NodeId, f64)]) -> Vec<(NodeId, f64)> {
     let mut starts = vec![];
     let law = |device: &Device| {
         matches!(
@@ -28,7 +28,7 @@ pub fn starts(devices: &[Device], nodes: usize, guesses: &[(NodeId, f64)]) -> Ve
     if let Some(ground) = known.first_mut() {
         *ground = Some(0.0);
     }
-    for (node, value) in guesses.iter() {
+    for (node, value) in guesses {
         if let Some(known) = known.get_mut(node.0 as usize) {
             *known = Some(*value);
         }

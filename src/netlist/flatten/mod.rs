@@ -17,6 +17,7 @@ mod analyses;
 mod experiment;
 mod guess;
 mod measures;
+mod guess;
 mod usage;
 pub mod vary;
 
@@ -61,7 +62,7 @@ pub fn flatten_with(
     }
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
-    let starts = guess::starts(&devices, flat.nodes.len(), &guesses);
+    let starts = guess::follow(&devices, flat.nodes.len(), &guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
     let (measures, watched) = measures::resolve(&flat, diagnostics);
     devices.extend(flat.quantities.take());
@@ -72,6 +73,7 @@ pub fn flatten_with(
         initial,
         guesses,
         starts,
+        initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
         steps,
         outputs,
