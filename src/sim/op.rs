@@ -123,9 +123,12 @@ pub(crate) fn operating_point(
     let mut tied = vec![];
     let result = settle_modes(network, state, slides, |network, state| {
         tied.clear();
-        let stated = network.system.pinned.iter().zip(&network.system.held);
-        for (held, (pinned, state)) in held.iter_mut().zip(stated) {
-            *held = *pinned && *state;
+        let stated = network.system.initial_charges.iter().zip(&network.system.held);
+        for ((held, (initial, state)), pinned) in
+            held.iter_mut().zip(stated).zip(&network.system.pinned)
+        {
+            let stated = network.system.initial_holds && initial.is_some();
+            *held = *state && (stated || *pinned);
         }
         begin_at_guesses(network, &held, &targets, floors, state, scratch);
         loop {
