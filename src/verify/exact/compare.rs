@@ -1,6 +1,6 @@
 //! One draw: both systems solved, and everything that must be equal compared.
 
-use super::bonds::{Bonds, Place};
+use super::bonds::{Alike, Bonds, Place};
 use super::draw::{Draw, Modular, decimal};
 use super::floats::Sides;
 use super::form::Trouble;
@@ -61,11 +61,13 @@ impl From<Trouble> for Nothing {
 pub fn draw<F: Modular>(graph: &BondGraph, text: &Text<'_>, draw: Draw) -> Result<Drawn, Nothing> {
     // A parameter that the text does not name is the number that it is.
     let literal: Vec<bool> = text.parameters.iter().map(Option::is_none).collect();
-    let bonds = Bonds::<F>::new(graph, draw, &literal)?;
-    let theirs = bonds.system.solve().map_err(|found| {
-        let (unknowns, of) = bonds.explain(&found);
-        Nothing::Singular { circuit: false, unknowns, of }
-    })?;
+    let mut bonds = Bonds::<F>::new(graph, draw, &literal, Alike::default())?;
+    let mut theirs = solution(&bonds)?;
+    let alike = bonds.alike(&theirs)?;
+    if !alike.is_empty() {
+        bonds = Bonds::new(graph, draw, &literal, alike)?;
+        theirs = solution(&bonds)?;
+    }
     let wires = Wires::new(text, &bonds)?;
     let mut drawn =
         Drawn { unknowns: [bonds.system.unknowns, wires.system.unknowns], ..Drawn::default() };
@@ -89,6 +91,14 @@ pub fn draw<F: Modular>(graph: &BondGraph, text: &Text<'_>, draw: Draw) -> Resul
     laws(&sides, &cut, &mut drawn)?;
     memories(&sides, &mut drawn)?;
     Ok(drawn)
+}
+
+/// The solution of the bond graph's equations.
+fn solution<F: Modular>(bonds: &Bonds<F>) -> Result<Vec<F>, Nothing> {
+    bonds.system.solve().map_err(|found| {
+        let (unknowns, of) = bonds.explain(&found);
+        Nothing::Singular { circuit: false, unknowns, of }
+    })
 }
 
 /// Parameters that others define.

@@ -62,6 +62,10 @@ pub struct Cut<F> {
     pub own: Option<VertexId>,
 }
 
+/// What the numbers of laws that are cut alike are drawn by.
+const ALIKE_OFFSET: u64 = 0x6f66_6673;
+const ALIKE_SLOPE: u64 = 0x736c_6f70;
+
 /// The equations of a graph.
 pub struct Bonds<'g, F> {
     /// The graph.
@@ -78,12 +82,24 @@ pub struct Bonds<'g, F> {
     pub cuts: HashMap<Place, Cut<F>>,
     /// Moduli that are cut, and what to.
     moduli: Vec<(Expr, VertexId, F)>,
+    /// What is cut alike.
+    alike: Alike<F>,
     /// By vertex and port: the unknown that it stores.
     stored: HashMap<End, u32>,
     /// By signal: its unknown. Waveforms have one too, so that a product of two is no number on either side.
     signals: Vec<u32>,
     /// s
     pub s: F,
+}
+
+/// Laws and moduli that have the value of another, or its negative, in a solution: what is one function is cut to one
+/// value, so that both may stand in one expression. Each with that value.
+#[derive(Clone, Debug)]
+pub struct Alike<F> {
+    /// Laws.
+    pub laws: HashMap<Place, F>,
+    /// Moduli of two-ports.
+    pub moduli: HashMap<VertexId, F>,
 }
 
 /// Whether the ports of a field are inertias whose matrix is constant: coupled inductors hold it.
@@ -158,7 +174,12 @@ impl<'g, F: Modular> Bonds<'g, F> {
     ///
     /// # Errors
     /// What has no value in it.
-    pub fn new(graph: &'g BondGraph, draw: Draw, literal: &[bool]) -> Result<Self, Trouble> {
+    pub fn new(
+        graph: &'g BondGraph,
+        draw: Draw,
+        literal: &[bool],
+        alike: Alike<F>,
+    ) -> Result<Self, Trouble> {
         let mut bonds = Bonds {
             graph,
             draw,
@@ -167,6 +188,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             origins: vec![],
             cuts: HashMap::new(),
             moduli: vec![],
+            alike,
             stored: HashMap::new(),
             signals: vec![],
             s: draw.of(Of::S),
@@ -284,6 +306,16 @@ impl<'g, F: Modular> Bonds<'g, F> {
         self.origins.push(origin);
     }
 
+    /// The random number of a law or modulus that is cut: its own, or that of all that have its value. What has the
+    /// negative value has the negative number.
+    fn number(&self, own: Of, alike: Option<F>, which: u64) -> F {
+        let Some(value) = alike else { return self.draw.of(own) };
+        match value.value() <= (-value).value() {
+            true => self.draw.opaque(which, &[value]),
+            false => -self.draw.opaque::<F>(which, &[-value]),
+        }
+    }
+
     /// The value of a law at a port: its form, or what it is cut to.
     fn law(&mut self, end: End, law: Expr, follows: Follows) -> Result<Form<F>, Trouble> {
         let own = Some(end.vertex);
@@ -292,13 +324,13 @@ impl<'g, F: Modular> Bonds<'g, F> {
             found => return found,
         }
         let (vertex, port) = (end.vertex.0, end.port);
-        let offset: F = self.draw.of(Of::Offset(vertex, port));
+        let alike = self.alike.laws.get(&Place::Port(end)).copied();
+        let offset = self.number(Of::Offset(vertex, port), alike, ALIKE_OFFSET);
+        let drawn = self.number(Of::Slope(vertex, port), alike, ALIKE_SLOPE);
         let (slope, followed): (F, _) = match follows {
             Follows::Nothing => (F::ZERO, Form::number(F::ZERO)),
-            Follows::Stored(end) => (self.draw.of(Of::Slope(vertex, port)), self.stored(end)?),
-            Follows::Port(end, power) => {
-                (self.draw.of(Of::Slope(vertex, port)), self.at(end, power))
-            }
+            Follows::Stored(end) => (drawn, self.stored(end)?),
+            Follows::Port(end, power) => (drawn, self.at(end, power)),
         };
         let value = followed.times(slope).plus(offset, &Form::number(F::ONE));
         let cut = Cut { offset, slope, follows, value: value.clone(), law, own };
@@ -358,7 +390,8 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Err(Trouble::Nonlinear) => None,
             Err(trouble) => return Err(trouble),
         };
-        let number: F = known.unwrap_or_else(|| self.draw.of(Of::Slope(id.0, 2)));
+        let alike = self.alike.moduli.get(&id).copied();
+        let number = known.unwrap_or_else(|| self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET));
         if known.is_none() {
             self.moduli.push((value.clone(), id, number));
         }
@@ -532,7 +565,8 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Err(Trouble::Nonlinear) => {}
             found => return found,
         }
-        let offset: F = self.draw.of(Of::Signal(id.index()));
+        let alike = self.alike.laws.get(&Place::Signal(id)).copied();
+        let offset = self.number(Of::Signal(id.index()), alike, ALIKE_OFFSET);
         let value = Form::number(offset);
         let cut = Cut {
             offset,
