@@ -13,6 +13,7 @@ use crate::bond::syntax;
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
+use crate::netlist::dialects::{Dialect, NGSPICE};
 use crate::netlist::header::Header;
 use crate::netlist::read::How;
 use crate::netlist::{Netlist, flatten, read, write};
@@ -22,7 +23,8 @@ use crate::source::{FileId, SourceMap, Span};
 use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
 use crate::translate::{self, Translation};
-use crate::verify::{self, Report};
+use crate::verify::{self, Report, Times};
+use std::time::Instant;
 
 /// What a text is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -498,6 +500,8 @@ pub struct Question {
     pub netlist: Option<FileId>,
     /// A map of it other than the translation's own, as JSON.
     pub map: Option<serde_json::Value>,
+    /// The dialect that the translation's own is written in, where that is not ngspice.
+    pub to: Option<&'static Dialect>,
     /// What random numbers follow from.
     pub seed: Option<u64>,
 }
@@ -523,12 +527,24 @@ pub fn verify(
         return Ok(None);
     }
     let Some(model) = model(map, file, overrides, d) else { return Ok(None) };
-    let Some((certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
+    let begin = Instant::now();
+    let Some((mut certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
     else {
         return Ok(None);
     };
+    if !model.graph.scales.is_empty() {
+        let plain = Overrides { scale: vec![], ..overrides.clone() };
+        let Some(plain) = self::model(map, file, &plain, &mut vec![]) else { return Ok(None) };
+        certificate.scaling = Some(verify::scaling(
+            [&plain.graph, &model.graph],
+            [&plain.initial, &model.initial],
+            &overrides.scale,
+            question.seed.unwrap_or(verify::SEED),
+        ));
+    }
+    let mut times = Times { text: begin.elapsed().as_secs_f64(), ..Times::default() };
     if !certificate.holds() || model.graph.experiment.until.is_none() {
-        return Ok(Some(Report::of_text(certificate)));
+        return Ok(Some(Report::of_text(certificate).timed(times)));
     }
     let circuit = flatten::flatten(&netlist, d).map(|mut circuit| {
         let given = overrides.options.iter();
@@ -543,14 +559,18 @@ pub fn verify(
         adapt(settings);
     }
     let mut trace = run.trace();
+    let begin = Instant::now();
     if let Err(failure) = run.go(&mut trace) {
         if failure.kind != FailureKind::Interrupted {
             d.push(*failure.diagnostic);
         }
         return Err(failure.kind);
     }
+    times.circuit = begin.elapsed().as_secs_f64();
+    let begin = Instant::now();
     let report = verify::judge(&model.graph, &model.causality, &trace, &demands, d);
-    Ok(report.map(|report| report.with(certificate)))
+    times.second = begin.elapsed().as_secs_f64();
+    Ok(report.map(|report| report.with(certificate).timed(times)))
 }
 
 /// The parts of the certificate that look at the text alone, and the netlist that was read from it.
@@ -561,18 +581,24 @@ pub fn certificate(
     how: &How,
     d: &mut Vec<Diagnostic>,
 ) -> Option<(verify::Certificate, Netlist)> {
-    let text = match question.netlist {
-        Some(file) => file,
+    let ours = &model.translation.netlist;
+    let netlist = match question.netlist {
+        Some(file) => read::read(map, file, how, d),
         None => {
-            let text = write::write(&model.translation.netlist);
-            map.add(format!("{}.cir", model.graph.name), text)
+            let dialect = question.to.unwrap_or(&NGSPICE);
+            let text = dialect.write(ours, d)?.text;
+            let file = map.add(format!("{}.cir", model.graph.name), text);
+            read::read(map, file, &How::of(dialect), d)
         }
     };
-    let netlist = read::read(map, text, how, d);
     if has_errors(d) {
         return None;
     }
     let mut translation = model.translation.clone();
+    // What the dialect cannot say has been said; a text in it may stand for the model nevertheless.
+    if let Some(written) = netlist.dialect.write(ours, &mut vec![]) {
+        translation.netlist = written.netlist;
+    }
     if let Some(json) = &question.map {
         match translate::Map::from_json(json, &mut translation.netlist.names) {
             Some(map) => {

@@ -392,8 +392,11 @@ impl Check<'_> {
                 netlist::Leaf::Current(_) => wanted.push(leaf.clone()),
                 netlist::Leaf::Parameter(_) | netlist::Leaf::Time => {}
             });
+            let dialect = text.netlist.dialect;
             for leaf in wanted {
-                for (print, card) in [(0, ".save"), (1, ".print")] {
+                // Some simulators save everything, and some print from what they have saved.
+                let asked = [(0, ".save", dialect.save), (1, ".print", dialect.print)];
+                for (print, card, _) in asked.into_iter().filter(|(.., word)| !word.is_empty()) {
                     let ground = matches!(leaf, netlist::Leaf::Voltage(node, None)
                         if names.text(node) == "0");
                     let there = all[print] || ground || items[print].contains(&leaf);
@@ -421,7 +424,13 @@ impl Check<'_> {
             let last: std::collections::BTreeMap<String, String> = options.into_iter().collect();
             last
         };
-        let (theirs, ours) = (gather(self.text.netlist), gather(ours));
+        let (theirs, mut ours) = (gather(self.text.netlist), gather(ours));
+        if ours.keys().any(|key| key.starts_with(".options")) {
+            for more in self.text.netlist.dialect.options.1 {
+                let (key, value) = more.split_once('=').unwrap_or((more, "1"));
+                ours.insert(format!(".options {key}"), value.to_string());
+            }
+        }
         for key in theirs.keys().chain(ours.keys()).collect::<std::collections::BTreeSet<_>>() {
             self.compared += 1;
             let (is, should) = (theirs.get(key), ours.get(key));

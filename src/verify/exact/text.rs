@@ -38,6 +38,8 @@ pub struct Variable {
     pub bg: String,
     /// What it is in the text.
     pub expr: Result<Expr, String>,
+    /// Its value in its unit is the expression times this.
+    pub factor: f64,
     /// Whether it is an observed column.
     pub observed: bool,
 }
@@ -86,7 +88,7 @@ impl<'n> Text<'n> {
                     Ok(Expr::new(crate::expr::Node::Leaf(leaf), span))
                 });
                 let (bg, observed) = (variable.bg.clone(), variable.observed);
-                Some(Variable { bg, expr, observed })
+                Some(Variable { bg, expr, factor: variable.factor, observed })
             })
             .collect();
         let by_name = (0..variables.len()).map(|k| (variables[k].bg.clone(), k)).collect();

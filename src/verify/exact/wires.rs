@@ -48,6 +48,8 @@ pub struct Wires<'t, F> {
     pub system: System<F>,
     /// By device: its current.
     currents: Vec<Form<F>>,
+    /// By node: the first that sources of 0 V join it to.
+    joined: Vec<u32>,
     /// Cards that were cut.
     pub cuts: Vec<CutCard>,
     /// Devices that cannot be read, and why.
@@ -70,6 +72,7 @@ impl<'t, F: Modular> Wires<'t, F> {
             known: RefCell::new(HashMap::new()),
             system: System { unknowns: text.circuit.nodes.len() - 1, rows: vec![] },
             currents: vec![Form::number(F::ZERO); text.flat.devices.len()],
+            joined: joined(text),
             cuts: vec![],
             strange: vec![],
         };
@@ -424,6 +427,7 @@ impl<'t, F: Modular> Wires<'t, F> {
                 let is_voltage = matches!(element, Element::BehaviouralVoltage { .. });
                 let value = match self.form(pending_scope, law) {
                     Err(Trouble::Nonlinear) => self.cut(device, is_voltage)?,
+                    Ok(_) if self.must_be_cut(device) => self.cut(device, is_voltage)?,
                     found => found?,
                 };
                 let given = if is_voltage { voltage } else { current };
@@ -479,6 +483,24 @@ impl<'t, F: Modular> Wires<'t, F> {
         self.text.header.samples.iter().any(|sample| sample.clock.eq_ignore_ascii_case(&name))
     }
 
+    /// Whether a behavioural card that is affine stands for a law that is cut: one of its arguments is 0 in this circuit,
+    /// and none of its other cards is the law.
+    fn must_be_cut(&self, device: usize) -> bool {
+        let Some(place) = self.text.claims[device] else { return false };
+        let Some(devices) = self.text.devices.get(&place) else { return false };
+        let laws = devices.iter().filter_map(|k| match self.text.element(*k)? {
+            (
+                pending,
+                Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law },
+            ) => Some((*k, self.form(pending.scope, law))),
+            _ => None,
+        });
+        let laws: Vec<_> = laws.collect();
+        self.bonds.cuts.contains_key(&place)
+            && laws.first().is_some_and(|(first, _)| *first == device)
+            && !laws.iter().any(|(_, form)| *form == Err(Trouble::Nonlinear))
+    }
+
     /// What a behavioural card that is not affine is cut to.
     fn cut(&mut self, device: usize, is_voltage: bool) -> Result<Form<F>, Trouble> {
         let place = self.text.claims[device];
@@ -521,11 +543,27 @@ impl<'t, F: Modular> Wires<'t, F> {
     /// Whether a device stands with its first node at the − of a port.
     fn stands_turned(&self, device: usize, end: crate::bond::graph::End) -> bool {
         let Some(effort) = self.text.effort(self.graph, end) else { return false };
-        let own = self.between(&self.text.circuit.devices[device].nodes);
+        let own = self.joined(&self.between(&self.text.circuit.devices[device].nodes));
         match self.form(TOP, effort) {
-            Ok(effort) => effort.times(-F::ONE) == own && !own.terms.is_empty(),
+            Ok(effort) => {
+                self.joined(&effort.times(-F::ONE)) == own && !own.terms.is_empty()
+            }
             Err(_) => false,
         }
+    }
+
+    /// A form in which nodes that sources of 0 V join are one, as those are that sense a port's current.
+    fn joined(&self, form: &Form<F>) -> Form<F> {
+        let mut all = Form::number(form.constant);
+        for (column, factor) in &form.terms {
+            let one = match self.joined.get(*column as usize + 1) {
+                Some(0) => Form::number(F::ZERO),
+                Some(node) => Form::unknown(node - 1),
+                None => Form::unknown(*column),
+            };
+            all = all.plus(*factor, &one);
+        }
+        all
     }
 
     /// What a cut law follows, in the unknowns of the circuit.
@@ -559,7 +597,9 @@ impl<'t, F: Modular> Wires<'t, F> {
             }
             Follows::Port(end, Power::Flow) => {
                 // The current of a voltage source that stands at the port.
-                let effort = self.text.effort(self.graph, end).map(|expr| self.form(TOP, expr));
+                let effort = self.text.effort(self.graph, end);
+                let effort = effort.map(|expr| Ok(self.joined(&self.form(TOP, expr)?)));
+                let effort: Option<Result<Form<F>, Trouble>> = effort;
                 let devices = self.text.devices.get(&Place::Port(end)).into_iter().flatten();
                 for other in devices {
                     let kind = &self.text.circuit.devices[*other].kind;
@@ -569,7 +609,7 @@ impl<'t, F: Modular> Wires<'t, F> {
                             | DeviceKind::Ccvs { .. }
                             | DeviceKind::BehaviouralVoltage { .. }
                     );
-                    let own = self.between(&self.text.circuit.devices[*other].nodes);
+                    let own = self.joined(&self.between(&self.text.circuit.devices[*other].nodes));
                     let current = self.currents[*other].clone();
                     match &effort {
                         Some(Ok(effort)) if carries && *effort == own => return Ok(current),
@@ -618,6 +658,31 @@ impl<'t, F: Modular> Wires<'t, F> {
             _ => None,
         }
     }
+}
+
+/// By node of a circuit: the first that sources of 0 V join it to.
+fn joined(text: &Text<'_>) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..text.circuit.nodes.len() as u32).collect();
+    fn root(parent: &mut [u32], mut at: u32) -> u32 {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+    for (k, device) in text.circuit.devices.iter().enumerate() {
+        let sense = match text.element(k) {
+            Some((_, Element::VoltageSource(Waveform::Constant(value)))) => {
+                value.as_number() == Some(0.0)
+            }
+            _ => false,
+        };
+        if let (true, [a, b, ..]) = (sense, &device.nodes[..]) {
+            let (a, b) = (root(&mut parent, a.0), root(&mut parent, b.0));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    (0..parent.len() as u32).map(|node| root(&mut parent, node)).collect()
 }
 
 /// Whether an expression is one leaf, or its negative.

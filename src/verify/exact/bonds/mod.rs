@@ -22,6 +22,7 @@ use crate::bond::graph::{
     Power, SignalId, SignalLaw, Storage, StoreLaw, Variable, VertexId,
 };
 use crate::expr::Binary;
+use crate::quantity::Domain;
 use crate::source::Span;
 use std::collections::HashMap;
 
@@ -62,6 +63,8 @@ pub struct Cut<F> {
     pub own: Option<VertexId>,
 }
 
+/// Signals of signals are followed so far for a value that is known beforehand.
+const DEEPEST_KNOWN: usize = 16;
 /// What the numbers of laws that are cut alike are drawn by.
 const ALIKE_OFFSET: u64 = 0x6f66_6673;
 const ALIKE_SLOPE: u64 = 0x736c_6f70;
@@ -81,7 +84,7 @@ pub struct Bonds<'g, F> {
     /// Laws that are cut.
     pub cuts: HashMap<Place, Cut<F>>,
     /// Moduli that are cut, and what to.
-    moduli: Vec<(Expr, VertexId, F)>,
+    pub moduli: Vec<(Expr, VertexId, F)>,
     /// What is cut alike.
     alike: Alike<F>,
     /// By vertex and port: the unknown that it stores.
@@ -90,6 +93,9 @@ pub struct Bonds<'g, F> {
     signals: Vec<u32>,
     /// s
     pub s: F,
+    /// The domains whose efforts are divided by these factors and whose flows are multiplied, where what is drawn stands
+    /// for the unscaled graph.
+    scaled: Vec<(Domain, F)>,
 }
 
 /// Laws and moduli that have the value of another, or its negative, in a solution: what is one function is cut to one
@@ -180,10 +186,33 @@ impl<'g, F: Modular> Bonds<'g, F> {
         literal: &[bool],
         alike: Alike<F>,
     ) -> Result<Self, Trouble> {
+        Self::drawn(graph, draw, literal, alike, false)
+    }
+
+    /// The equations of a scaled graph, what is drawn for its laws and starts being that of the unscaled one.
+    ///
+    /// # Errors
+    /// What has no value in the draw.
+    pub fn of_scaled(graph: &'g BondGraph, draw: Draw) -> Result<Self, Trouble> {
+        Self::drawn(graph, draw, &[], Alike::default(), true)
+    }
+
+    fn drawn(
+        graph: &'g BondGraph,
+        draw: Draw,
+        literal: &[bool],
+        alike: Alike<F>,
+        unscale: bool,
+    ) -> Result<Self, Trouble> {
+        let parameters = parameters(graph, draw, literal)?;
+        let scales = graph.scales.iter().filter(|_| unscale);
+        let scaled = scales
+            .filter_map(|scale| Some((scale.domain, *parameters.get(scale.parameter.index())?)));
         let mut bonds = Bonds {
+            scaled: scaled.collect(),
             graph,
             draw,
-            parameters: parameters(graph, draw, literal)?,
+            parameters,
             system: System { unknowns: 2 * graph.bonds.len(), rows: vec![] },
             origins: vec![],
             cuts: HashMap::new(),
@@ -246,7 +275,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             }
             // What a rate form stores is counted from its start: s·q − q0 = f.
             Law::Rate { kind, .. } => {
-                let start: F = self.draw.of(Of::InitialStored(end.vertex.0, end.port));
+                let start = self.start(end, false);
                 let integral = self.at(end, kind.integrates()).plus(start, &Form::number(F::ONE));
                 Ok(integral.times(F::ONE / self.s))
             }
@@ -301,9 +330,79 @@ impl<'g, F: Modular> Bonds<'g, F> {
         self.reading().number(expr, &mut |leaf, _| self.leaf(leaf, None))
     }
 
+    /// An unscaled power variable is the graph's own times this.
+    pub fn factor(&self, bond: BondId, power: Power) -> F {
+        let domain = self.graph.bond(bond).domain;
+        let found = self.scaled.iter().find(|(scaled, _)| *scaled == domain);
+        match (found, power) {
+            (None, _) => F::ONE,
+            (Some((_, factor)), Power::Effort) => *factor,
+            (Some((_, factor)), Power::Flow) => F::ONE / *factor,
+        }
+    }
+
+    fn factor_at(&self, end: End, power: Power) -> F {
+        self.graph.bond_at(end).map_or(F::ONE, |bond| self.factor(bond, power))
+    }
+
+    /// The same of what a port stores.
+    fn factor_of_stored(&self, end: End) -> F {
+        self.graph.storage(end).map_or(F::ONE, |kind| self.factor_at(end, kind.integrates()))
+    }
+
+    /// The same of what a port's law gives.
+    fn factor_of_law(&self, end: End) -> F {
+        match self.graph.law_at(end) {
+            Law::Source { sets, .. } => self.factor_at(end, *sets),
+            Law::Dissipator(Dissipation::Linear(_) | Dissipation::Effort(_)) => {
+                self.factor_at(end, Power::Effort)
+            }
+            Law::Dissipator(Dissipation::Flow(_)) => self.factor_at(end, Power::Flow),
+            Law::Store { law: StoreLaw::OfPower(_), .. } => self.factor_of_stored(end),
+            Law::Store { kind, .. } | Law::Rate { kind, .. } => self.factor_at(end, kind.gives()),
+            Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_) => F::ONE,
+        }
+    }
+
+    /// What a storage starts from.
+    fn start(&self, end: End, power: bool) -> F {
+        let (vertex, port) = (end.vertex.0, end.port);
+        match (power, self.graph.storage(end)) {
+            (true, kind) => {
+                let by = kind.map_or(F::ONE, |kind| self.factor_at(end, kind.gives()));
+                self.draw.of::<F>(Of::InitialPower(vertex, port)) / by
+            }
+            (false, _) => {
+                self.draw.of::<F>(Of::InitialStored(vertex, port)) / self.factor_of_stored(end)
+            }
+        }
+    }
+
     fn row(&mut self, origin: Place, form: Form<F>) {
         self.system.rows.push(form);
         self.origins.push(origin);
+    }
+
+    /// The value of an expression of parameters and of signals that nothing but waveforms make, with the functions that
+    /// mean nothing in the field: it is known before anything is solved.
+    fn known(&self, expr: &Expr, depth: usize) -> Option<F> {
+        if depth > DEEPEST_KNOWN {
+            return None;
+        }
+        let leaf = &mut |leaf: &Leaf, _: Span| match leaf {
+            Leaf::Parameter(_) | Leaf::Time => self.leaf(leaf, None),
+            Leaf::Signal(id) => match &self.graph.signals[id.index()].law {
+                SignalLaw::Waveform(_) => {
+                    Ok(Form::number(self.draw.of(Of::Waveform(id.index()))))
+                }
+                SignalLaw::Algebraic(law) => {
+                    self.known(law, depth + 1).map(Form::number).ok_or(Trouble::Nonlinear)
+                }
+                _ => Err(Trouble::Nonlinear),
+            },
+            _ => Err(Trouble::Nonlinear),
+        };
+        self.reading().number(expr, leaf).ok().filter(|value| !value.is_zero())
     }
 
     /// The random number of a law or modulus that is cut: its own, or that of all that have its value. What has the
@@ -325,12 +424,16 @@ impl<'g, F: Modular> Bonds<'g, F> {
         }
         let (vertex, port) = (end.vertex.0, end.port);
         let alike = self.alike.laws.get(&Place::Port(end)).copied();
-        let offset = self.number(Of::Offset(vertex, port), alike, ALIKE_OFFSET);
-        let drawn = self.number(Of::Slope(vertex, port), alike, ALIKE_SLOPE);
+        let given = self.factor_of_law(end);
+        // What is known stays what it is: its text then has its value wherever it stands.
+        let known = if follows == Follows::Nothing { self.known(&law, 0) } else { None };
+        let drawn = || self.number(Of::Offset(vertex, port), alike, ALIKE_OFFSET) / given;
+        let offset = known.unwrap_or_else(drawn);
+        let drawn = self.number(Of::Slope(vertex, port), alike, ALIKE_SLOPE) / given;
         let (slope, followed): (F, _) = match follows {
             Follows::Nothing => (F::ZERO, Form::number(F::ZERO)),
-            Follows::Stored(end) => (drawn, self.stored(end)?),
-            Follows::Port(end, power) => (drawn, self.at(end, power)),
+            Follows::Stored(end) => (drawn * self.factor_of_stored(end), self.stored(end)?),
+            Follows::Port(end, power) => (drawn * self.factor_at(end, power), self.at(end, power)),
         };
         let value = followed.times(slope).plus(offset, &Form::number(F::ONE));
         let cut = Cut { offset, slope, follows, value: value.clone(), law, own };
@@ -439,7 +542,6 @@ impl<'g, F: Modular> Bonds<'g, F> {
         let graph = self.graph;
         let Some(bond) = graph.bond_at(end) else { return Ok(()) };
         let place = Place::Port(end);
-        let (vertex, port) = (end.vertex.0, end.port);
         let own = |power| Expr::leaf(Leaf::Own(Variable::Power(power)));
         match graph.law_at(end) {
             Law::Source { sets, value, .. } => {
@@ -463,7 +565,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Law::Store { kind, law, .. } => {
                 let start = match law {
                     StoreLaw::Linear(size) if self.is_number(size) => {
-                        let power: F = self.draw.of(Of::InitialPower(vertex, port));
+                        let power = self.start(end, true);
                         self.constant(size)? * power
                     }
                     StoreLaw::Linear(size) => {
@@ -487,7 +589,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Law::Rate { kind, rate, .. } => {
                 let follows = Follows::Port(end, kind.integrates());
                 let rate = self.law(end, rate.clone(), follows)?;
-                let start: F = self.draw.of(Of::InitialPower(vertex, port));
+                let start = self.start(end, true);
                 let state = self.at(end, kind.gives()).times(self.s);
                 self.row(place, state.minus(&Form::number(start)).minus(&rate));
             }
@@ -501,7 +603,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
         let value = self.law(end, law, Follows::Stored(end))?;
         let row = self.at(end, kind.gives()).minus(&value);
         self.row(Place::Port(end), row);
-        Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)))
+        Ok(self.start(end, false))
     }
 
     /// What a store with a law of its power variable starts from. Coupled inductors start from their currents.
@@ -511,13 +613,13 @@ impl<'g, F: Modular> Bonds<'g, F> {
             _ => false,
         };
         if !coupled {
-            return Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)));
+            return Ok(self.start(end, false));
         }
         self.reading().number(law, &mut |leaf, _| match leaf {
             Leaf::Bond { bond, negated, .. } => {
                 let bonds = &self.graph.vertex(end.vertex).bonds;
                 let port = bonds.iter().position(|b| b == bond).unwrap_or(0) as u32;
-                let power: F = self.draw.of(Of::InitialPower(end.vertex.0, port));
+                let power = self.start(End { vertex: end.vertex, port }, true);
                 let outward = self.graph.sign_into(*bond, end.vertex, port) < 0.0;
                 Ok(Form::number(if outward != *negated { -power } else { power }))
             }
@@ -566,7 +668,8 @@ impl<'g, F: Modular> Bonds<'g, F> {
             found => return found,
         }
         let alike = self.alike.laws.get(&Place::Signal(id)).copied();
-        let offset = self.number(Of::Signal(id.index()), alike, ALIKE_OFFSET);
+        let drawn = || self.number(Of::Signal(id.index()), alike, ALIKE_OFFSET);
+        let offset = self.known(law, 0).unwrap_or_else(drawn);
         let value = Form::number(offset);
         let cut = Cut {
             offset,
