@@ -392,9 +392,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
         let leaf = &mut |leaf: &Leaf, _: Span| match leaf {
             Leaf::Parameter(_) | Leaf::Time => self.leaf(leaf, None),
             Leaf::Signal(id) => match &self.graph.signals[id.index()].law {
-                SignalLaw::Waveform(_) => {
-                    Ok(Form::number(self.draw.of(Of::Waveform(id.index()))))
-                }
+                SignalLaw::Waveform(_) => Ok(Form::number(self.draw.of(Of::Waveform(id.index())))),
                 SignalLaw::Algebraic(law) => {
                     self.known(law, depth + 1).map(Form::number).ok_or(Trouble::Nonlinear)
                 }
