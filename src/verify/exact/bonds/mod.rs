@@ -492,7 +492,13 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Err(trouble) => return Err(trouble),
         };
         let alike = self.alike.moduli.get(&id).copied();
-        let number = known.unwrap_or_else(|| self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET));
+        // What is known stays what it is: its text then has its value wherever it stands.
+        let number = known.or_else(|| self.known(value, 0)).unwrap_or_else(|| {
+            let (given, given_power, other, other_power) = rows[0];
+            let by = self.factor_at(ends[given], given_power);
+            let of = self.factor_at(ends[other], other_power);
+            self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET) * of / by
+        });
         if known.is_none() {
             self.moduli.push((value.clone(), id, number));
         }
