@@ -17,7 +17,7 @@ use std::time::Instant;
 /// Graphs of each part.
 const EACH: u64 = 500;
 /// Of each sort of thing there must be so many proven graphs in a part that have one.
-const OF_EACH_SORT: u64 = 10;
+const OF_EACH_SORT: u64 = 3;
 
 /// What became of a graph.
 enum Fate {

@@ -428,11 +428,14 @@ impl Check<'_> {
             let last: std::collections::BTreeMap<String, String> = options.into_iter().collect();
             last
         };
-        let (theirs, mut ours) = (gather(self.text.netlist), gather(ours));
-        if ours.keys().any(|key| key.starts_with(".options")) {
-            for more in self.text.netlist.dialect.options.1 {
-                let (key, value) = more.split_once('=').unwrap_or((more, "1"));
-                ours.insert(format!(".options {key}"), value.to_string());
+        let (mut theirs, ours) = (gather(self.text.netlist), gather(ours));
+        // What every text of a dialect says for its simulator's sake says nothing of the model.
+        for more in self.text.netlist.dialect.options.1 {
+            let (key, value) = more.split_once('=').unwrap_or((more, "1"));
+            let key = format!(".options {key}");
+            let same = |is: &String| is.parse::<f64>().ok() == value.parse::<f64>().ok();
+            if !ours.contains_key(&key) && theirs.get(&key).is_some_and(same) {
+                theirs.remove(&key);
             }
         }
         for key in theirs.keys().chain(ours.keys()).collect::<std::collections::BTreeSet<_>>() {

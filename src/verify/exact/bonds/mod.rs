@@ -492,7 +492,13 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Err(trouble) => return Err(trouble),
         };
         let alike = self.alike.moduli.get(&id).copied();
-        let number = known.unwrap_or_else(|| self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET));
+        // What is known stays what it is: its text then has its value wherever it stands.
+        let number = known.or_else(|| self.known(value, 0)).unwrap_or_else(|| {
+            let (given, given_power, other, other_power) = rows[0];
+            let by = self.factor_at(ends[given], given_power);
+            let of = self.factor_at(ends[other], other_power);
+            self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET) * of / by
+        });
         if known.is_none() {
             self.moduli.push((value.clone(), id, number));
         }
@@ -663,7 +669,18 @@ impl<'g, F: Modular> Bonds<'g, F> {
     fn signal_law(&mut self, id: SignalId, law: &Expr) -> Result<Form<F>, Trouble> {
         match self.form(law, None) {
             Err(Trouble::Nonlinear) => {}
-            found => return found,
+            found => {
+                // A law of time alone is a number, which a dialect may spell by other functions: its card is compared.
+                if let Ok(Some(offset)) = found.as_ref().map(Form::as_number)
+                    && speaks_of_time(law)
+                {
+                    let (slope, follows) = (F::ZERO, Follows::Nothing);
+                    let (value, law) = (Form::number(offset), law.clone());
+                    let cut = Cut { offset, slope, follows, value, law, own: None };
+                    self.cuts.insert(Place::Signal(id), cut);
+                }
+                return found;
+            }
         }
         let alike = self.alike.laws.get(&Place::Signal(id)).copied();
         let drawn = || self.number(Of::Signal(id.index()), alike, ALIKE_OFFSET);
@@ -680,6 +697,12 @@ impl<'g, F: Modular> Bonds<'g, F> {
         self.cuts.insert(Place::Signal(id), cut);
         Ok(value)
     }
+}
+
+fn speaks_of_time(law: &Expr) -> bool {
+    let mut found = false;
+    law.leaves(&mut |leaf, _| found |= *leaf == Leaf::Time);
+    found
 }
 
 /// What stands for exp(−s·T) of a delay.
