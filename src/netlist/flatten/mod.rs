@@ -17,7 +17,6 @@ mod analyses;
 mod experiment;
 mod guess;
 mod measures;
-mod guess;
 mod usage;
 pub mod vary;
 

@@ -226,11 +226,6 @@ impl Language for Spice<'_> {
         let span = self.span(pair.as_span());
         let folded = name.to_ascii_lowercase();
         let row = calls::find(&folded);
-        if row.is_none() && folded != "table" && folded != "pwl" {
-            if let Some(leaf) = self.reading(&folded, &pair) {
-                return Some(Expr::new(Node::Leaf(leaf), span));
-            }
-        }
         if row.is_none() && folded != "table" && folded != "pwl" && self.calls.is_none() {
             d.push(parse::unknown_function(name, span));
             return None;

@@ -52,4 +52,3 @@ fn a_model_in_the_middle_of_a_series_loop_is_a_subcircuit_whose_minus_sides_need
     assert_eq!(nested.inlined, [], "{text}");
     assert!(text.contains(".subckt Two a_p a_m b_p b_m PARAMS: R=1"), "{text}");
 }
-

@@ -18,7 +18,7 @@ use super::system::System;
 use super::text::{Start, Text, waveform_of};
 use crate::bond::graph::{self, BondGraph, Law, ParameterId, SignalId};
 use crate::circuit::{DeviceKind, NodeId};
-use crate::netlist::flatten::scope::{self, ScopeId, TOP};
+use crate::netlist::flatten::scope::{self, ScopeId};
 use crate::netlist::flatten::values::Lookup;
 use crate::netlist::{Element, Expr, Leaf, Name, Waveform};
 use std::cell::RefCell;
