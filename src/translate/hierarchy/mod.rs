@@ -100,6 +100,13 @@ pub fn fold(
             break;
         }
     }
+    if (1..graph.tree.len() as u32).all(|instance| tree.scope(instance) == 0) {
+        // Nothing is left to fold: the flat circuit as it is, and why.
+        let (mut netlist, map) = (flat.netlist.clone(), flat.map.clone());
+        let inlined = reasons(&tree);
+        netlist.cards.splice(0..0, said(&inlined));
+        return Hierarchy { netlist, map, inlined, subcircuits: vec![] };
+    }
     let naming = Naming::new(graph, flat, &parts, &places, &tree, &ports, blocks, ground);
     let writer = Writer {
         graph,
@@ -214,13 +221,8 @@ impl Writer<'_> {
             }
         }
         let mut cards = self.circuit(&uses, &definitions, &mut names);
-        let inlined = (self.tree.instances.iter().zip(&self.tree.inlined))
-            .filter_map(|(instance, why)| Some((instance.name.clone(), why.clone()?)));
-        let inlined: Vec<(String, String)> = inlined.collect();
-        let said = inlined.iter().flat_map(|(name, why)| {
-            [comment(&format!(" {name} stands inlined:")), comment(&format!("   {why}"))]
-        });
-        cards.splice(0..0, said);
+        let inlined = reasons(self.tree);
+        cards.splice(0..0, said(&inlined));
         let (header, map) = told::told(self.naming, self.tree, &mut names, &mut cards);
         let title = self.flat.netlist.title.clone();
         let dialect = self.flat.netlist.dialect;
@@ -466,4 +468,18 @@ impl Writer<'_> {
 
 fn comment(text: &str) -> Card {
     Card { kind: CardKind::Comment(text.to_string()), span: Span::NONE, comment: None }
+}
+
+/// The instances that stand inlined, and why.
+fn reasons(tree: &Tree) -> Vec<(String, String)> {
+    let instances = tree.instances.iter().zip(&tree.inlined);
+    instances.filter_map(|(instance, why)| Some((instance.name.clone(), why.clone()?))).collect()
+}
+
+/// The same as comments.
+fn said(inlined: &[(String, String)]) -> Vec<Card> {
+    let lines = inlined.iter().flat_map(|(name, why)| {
+        [comment(&format!(" {name} stands inlined:")), comment(&format!("   {why}"))]
+    });
+    lines.collect()
 }
