@@ -398,7 +398,7 @@ impl Inside {
             std::mem::swap(&mut self.dense, &mut work.dense);
             let taken = trbdf2::step(network, from, &mut self.shorter, weights, work);
             std::mem::swap(&mut self.dense, &mut work.dense);
-            if matches!(taken, Ok(error) if error <= 1.0) {
+            if taken.is_ok() {
                 self.point.copy_from(&self.shorter);
             }
             self.factorised = None;

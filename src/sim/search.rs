@@ -57,13 +57,16 @@ pub(crate) fn find(
     if network.system.is_linear() {
         return Err(first);
     }
+    let mut of_storages = false;
     if let Cut::Singular(singular) = &first {
         if network.is_singular_by_storages(singular, question.held) {
             return Err(first);
         }
-        // At rest, where a law may have no slope, the guess itself may be the solution.
-        let at_rest = misfit(network, question, &guess, scratch);
-        if at_rest.is_empty() {
+        // At rest, where a law may have no slope, the guess itself may be the solution; where storages depend on each other
+        // the circuit is of index 2, which is for the run to know.
+        let n = network.system.equations() as u32;
+        of_storages = singular.rows.iter().flatten().any(|row| *row >= n);
+        if !of_storages && misfit(network, question, &guess, scratch).is_empty() {
             state.copy_from(&guess);
             return Ok(());
         }
@@ -97,7 +100,7 @@ pub(crate) fn find(
     match first {
         // The helps did not come off the ground either: what stood in the way at first is the reason.
         Cut::NonFinite { .. } => Err(first),
-        Cut::Singular(_) if !helped => Err(first),
+        Cut::Singular(_) if !helped || of_storages => Err(first),
         Cut::Singular(ref singular)
             if stays_singular(network, question, &best, singular, state.t) =>
         {
