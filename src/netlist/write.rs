@@ -41,6 +41,7 @@ impl Form<'_> {
             Operator::Integral => "sdt".to_string(),
             Operator::Delay => "delay".to_string(),
             Operator::Transfer => "laplace".to_string(),
+            Operator::Table => "table".to_string(),
             Operator::Waveform(shape) => format!("spice_{}", read::waveforms::row(shape).name),
         };
         let arguments: Vec<String> = arguments.iter().map(|a| self.expression(a)).collect();
