@@ -219,7 +219,7 @@ fn a_law_of_time_across_a_capacitor() {
     let times: Vec<f64> = (1..60).map(|k| f64::from(k) * 0.331e-6).collect();
     for row in at(deck, &times, &["--option", "reltol=1e-4"]) {
         let phase = 6283185.307179586 * row[0];
-        let exact = -(6.283185307179586 * phase.cos() + phase.sin());
+        let exact = -(std::f64::consts::TAU * phase.cos() + phase.sin());
         close(row[1], exact, 1e-3 * 12.6);
     }
 }
@@ -264,7 +264,7 @@ fn a_relaxation_oscillator() {
     let (mut t, mut v, mut on) = (0.0, 0.0, false);
     let end = loop {
         let ((to, tau), goal) = if on { (drain, 1.5) } else { (charge, 2.5) };
-        let time = tau * ((v - to) / (goal - to) as f64).ln();
+        let time = tau * ((v - to) / (goal - to)).ln();
         if t + time > 10e-3 {
             break to + (v - to) * (-(10e-3 - t) / tau).exp();
         }

@@ -126,7 +126,8 @@ fn stated_temperature(netlist: &Netlist) -> Option<f64> {
         _ => None,
     });
     let texts = options.flatten().filter(|(key, _)| key == "temp");
-    texts.filter_map(|(_, text)| number::number(text, numbers)).last().map(|read| read.value)
+    let values = texts.filter_map(|(_, text)| number::number(text, numbers));
+    values.map(|read| read.value).reduce(|_, last| last)
 }
 
 struct Expander<'n> {
@@ -155,7 +156,7 @@ fn globals(found: &mut Table<()>, cards: &[Card]) {
     }
 }
 
-fn parameters_of<'n>(card: &'n Card) -> impl Iterator<Item = (Name, &'n Expr)> {
+fn parameters_of(card: &Card) -> impl Iterator<Item = (Name, &Expr)> {
     let parameters = match &card.kind {
         CardKind::Parameters(parameters) => parameters.as_slice(),
         _ => &[],
