@@ -153,6 +153,8 @@ pub(crate) struct Work {
     pub error: Vec<f64>,
     /// Weights of the rates that no unknown's error shows, since the circuit is of index 2 there; infinite elsewhere.
     pub rate_weights: Vec<f64>,
+    /// What counts as nothing of their charges.
+    pub rate_floors: Vec<f64>,
     pub dense: Dense,
     pub scratch: Scratch,
     /// The time before the last, for methods of several steps; `None` after a restart.
@@ -177,6 +179,7 @@ impl Work {
             slopes: vec![0.0; n],
             error: vec![0.0; n],
             rate_weights: vec![f64::INFINITY; charges],
+            rate_floors: vec![0.0; charges],
             dense: Dense::new(n, charges),
             scratch: Scratch::new(n, charges),
             before: None,

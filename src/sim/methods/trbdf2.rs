@@ -31,7 +31,7 @@ pub(crate) fn step(
     const W: f64 = SQRT_2 / 4.0;
     let h = to.t - from.t;
     let alpha = 1.0 / (D * h);
-    let Work { x, q, w, beta, sum, error, rate_weights, dense, scratch, .. } = work;
+    let Work { x, q, w, beta, sum, error, rate_weights, rate_floors, dense, scratch, .. } = work;
 
     x.copy_from_slice(&from.x);
     network.remember_junctions(x);
@@ -68,7 +68,7 @@ pub(crate) fn step(
         let line = (1.0 - GAMMA) * from.x[i] + GAMMA * to.x[i];
         *k = (x[i] - line) / (GAMMA * (1.0 - GAMMA));
     }
-    let rates = rate_error(h, q, from, to, dense, rate_weights);
+    let rates = rate_error(h, q, from, to, dense, [rate_weights, rate_floors]);
     Ok(weighted(error, weights).max(rates))
 }
 
@@ -81,7 +81,7 @@ fn rate_error(
     from: &State,
     to: &State,
     dense: &Dense,
-    weights: &[f64],
+    [weights, floors]: [&[f64]; 2],
 ) -> f64 {
     const GAMMA: f64 = 2.0 - SQRT_2;
     /// Of equal and opposite errors of the rates at the ends the cubic shows θ·(1 − θ)·h.
@@ -93,8 +93,7 @@ fn rate_error(
         }
         let line = (1.0 - GAMMA) * from.q[k] + GAMMA * to.q[k];
         let curve = SEEN * (dense.q[0][k] + GAMMA * dense.q[1][k]);
-        let rounding = 64.0 * f64::EPSILON * (from.q[k].abs() + to.q[k].abs());
-        let missed = ((line + curve - middle[k]).abs() - rounding).max(0.0);
+        let missed = ((line + curve - middle[k]).abs() - floors[k]).max(0.0);
         largest = largest.max(missed / (SEEN * h * weight));
     }
     largest

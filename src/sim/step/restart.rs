@@ -23,6 +23,10 @@ fn index_2_part(reltol: f64) -> f64 {
 const SIGHT: f64 = 0.25;
 const INDEX_2_SIGHT: f64 = 0.02;
 
+/// Charges of index 2 that a step misses by this part of `reltol` say nothing of their rates: over a short step that is
+/// rounding.
+const RATE_FLOOR: f64 = 1e-3;
+
 /// Multiples of it, without their whole parts, lie about evenly between 0 and 1.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -272,7 +276,10 @@ impl Run<'_> {
         self.was_index2 = self.index2;
         for (k, w) in self.state.w.iter().enumerate() {
             self.largest_rates[k] = self.largest_rates[k].max(w.abs());
-            self.work.rate_weights[k] = if self.untested_rates[k] {
+            let floor = RATE_FLOOR * reltol * self.state.q[k].abs();
+            self.work.rate_floors[k] = self.work.rate_floors[k].max(floor);
+            // What charges were redistributed to is not exact enough to judge a first, short step's rates by.
+            self.work.rate_weights[k] = if self.untested_rates[k] && !self.fresh {
                 reltol * self.largest_rates[k] + self.settings.abstol
             } else {
                 f64::INFINITY
