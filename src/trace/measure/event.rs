@@ -77,8 +77,6 @@ pub(super) struct Segment<'a> {
     pub y1: &'a [f64],
     /// The row before both.
     pub before: Option<(f64, &'a [f64])>,
-    /// Whether it is but the first row.
-    pub first: bool,
 }
 
 impl Segment<'_> {
