@@ -219,7 +219,7 @@ fn a_law_of_time_across_a_capacitor() {
     let times: Vec<f64> = (1..60).map(|k| f64::from(k) * 0.331e-6).collect();
     for row in at(deck, &times, &["--option", "reltol=1e-4"]) {
         let phase = 6283185.307179586 * row[0];
-        let exact = -(6.283185307179586 * phase.cos() + phase.sin());
+        let exact = -(std::f64::consts::TAU * phase.cos() + phase.sin());
         close(row[1], exact, 1e-3 * 12.6);
     }
 }
@@ -259,12 +259,12 @@ fn a_relaxation_oscillator() {
     let deck = "V1 v 0 5\nR1 v a 1k\nC1 a 0 1u ic=0\nS1 a 0 a 0 sm\n.save v(a)\n\
                 .model sm SW(vt=2 vh=0.5 ron=10 roff=1meg)\n.tran 1u 10m uic";
     // Charging to 2.5 V, discharging to 1.5 V, by turns.
-    let charge = (5.0 / 1.001, 1e-6 * 1e3 / 1.001);
+    let charge: (f64, f64) = (5.0 / 1.001, 1e-6 * 1e3 / 1.001);
     let drain = (5.0 * 10.0 / 1010.0, 1e-6 * 1e3 * 10.0 / 1010.0);
-    let (mut t, mut v, mut on) = (0.0, 0.0, false);
+    let (mut t, mut v, mut on) = (0.0, 0.0_f64, false);
     let end = loop {
-        let ((to, tau), goal) = if on { (drain, 1.5) } else { (charge, 2.5) };
-        let time = tau * ((v - to) / (goal - to) as f64).ln();
+        let ((to, tau), goal): ((f64, f64), f64) = if on { (drain, 1.5) } else { (charge, 2.5) };
+        let time = tau * ((v - to) / (goal - to)).ln();
         if t + time > 10e-3 {
             break to + (v - to) * (-(10e-3 - t) / tau).exp();
         }

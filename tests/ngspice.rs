@@ -2,28 +2,17 @@
 //! there are none.
 
 mod references;
+mod stock_ngspice;
 mod translated;
 
 use bondspice::bond::elaborate::Overrides;
-use bondspice::expr::Expr;
-use bondspice::netlist::Leaf;
 use bondspice::second;
 use bondspice::trace::{Trace, compare, formats};
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use stock_ngspice::ngspice;
 use translated::{Translated, models, root, translated};
-
-/// Whether ngspice is there; where it must be and is not, the test fails.
-fn ngspice() -> bool {
-    let found = Command::new("ngspice").arg("--version").output().is_ok();
-    if !found {
-        let required = std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_some_and(|v| v == "1");
-        assert!(!required, "ngspice is missing");
-        eprintln!("skipped: ngspice is missing");
-    }
-    found
-}
 
 /// The observed columns as ngspice computes them, by the map.
 fn run(model: &Translated) -> Trace {
@@ -32,55 +21,7 @@ fn run(model: &Translated) -> Trace {
 
 /// The same of a text that differs from the model's own in how it is to be run.
 fn run_as(model: &Translated, text: &str) -> Trace {
-    let folder = tempfile::tempdir().unwrap();
-    let deck = folder.path().join("deck.cir");
-    let raw = folder.path().join("deck.raw");
-    std::fs::write(&deck, text).unwrap();
-    let output = Command::new("ngspice").arg("-b").arg("-r").arg(&raw).arg(&deck).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).to_string()
-        + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}\n{}", model.graph.name, model.text());
-    let bytes = std::fs::read(&raw).unwrap_or_else(|_| panic!("{}\n{said}", model.graph.name));
-    let result = formats::read("deck.raw", &bytes).unwrap();
-    let names = &model.translation.netlist.names;
-    let map = &model.translation.map;
-    let ground = names.find("0").unwrap();
-    let observed: Vec<_> = map.variables.iter().filter(|variable| variable.observed).collect();
-    let mut trace = Trace::new(
-        std::iter::once("time".to_string()).chain(observed.iter().map(|v| v.bg.clone())).collect(),
-        vec![],
-    );
-    trace.columns[0] = result.time().to_vec();
-    let column = |name: String| {
-        let name = name.to_lowercase();
-        result.column(&name).unwrap_or_else(|| panic!("{}: no {name}", model.graph.name))
-    };
-    for (at, variable) in observed.iter().enumerate() {
-        let expr: Expr<(Vec<f64>, f64)> = variable.expr.as_ref().unwrap().map(&mut |leaf, _| {
-            let zero = || vec![0.0; result.rows()];
-            let voltage = |node| match node == ground {
-                true => zero(),
-                false => column(format!("v({})", names.text(node))).to_vec(),
-            };
-            let values = match leaf {
-                Leaf::Voltage(plus, None) => voltage(*plus),
-                Leaf::Voltage(plus, Some(minus)) => {
-                    voltage(*plus).iter().zip(voltage(*minus)).map(|(a, b)| a - b).collect()
-                }
-                Leaf::Current(device) => column(format!("i({})", names.text(*device))).to_vec(),
-                Leaf::Time => result.time().to_vec(),
-                Leaf::Parameter(name) => {
-                    let value = map.parameters.iter().find(|(known, _)| known == name).unwrap().1;
-                    vec![value; result.rows()]
-                }
-            };
-            Expr::leaf((values, 0.0))
-        });
-        trace.columns[at + 1] = (0..result.rows())
-            .map(|row| expr.evaluate(&mut |(values, _)| values[row]) * variable.factor)
-            .collect();
-    }
-    trace
+    stock_ngspice::run(&model.graph.name, &model.nested.netlist, &model.nested.map, text).unwrap()
 }
 
 /// Compares named columns and says every error.

@@ -161,6 +161,7 @@ impl Build {
             origin: SignalOrigin::Signal,
             span: Span::NONE,
             unit: None,
+            home: 0,
         });
         SignalId(self.graph.signals.len() as u32 - 1)
     }

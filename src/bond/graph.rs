@@ -116,6 +116,9 @@ pub struct Signal {
     pub span: Span,
     /// Its unit, where one was found.
     pub unit: Option<crate::quantity::Unit>,
+    /// In whose words its law is written: an index into [`BondGraph::tree`]. That of an input is around the instance that
+    /// is given it.
+    pub home: u32,
 }
 
 /// How a signal came to be; decides the default columns and how it is drawn.
@@ -404,12 +407,50 @@ pub struct BondGraph {
     pub ports: Vec<(String, BondId)>,
     /// Instances that the file itself declares: by name, where.
     pub instances: HashMap<String, Span>,
+    /// The file, and every instance behind the one that it stands in; empty for a graph that came from no text.
+    pub tree: Vec<Instance>,
     /// What regulates what, in file order.
     pub regulators: Vec<Regulator>,
     /// What a plain run does.
     pub experiment: Experiment,
     /// The domains whose efforts and flows stand scaled.
     pub scales: Vec<super::scale::Scale>,
+}
+
+/// An instance of a model, or the file itself.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Its full name, `eha[2].motor`; empty for the file.
+    pub name: String,
+    /// Its model.
+    pub model: String,
+    /// The instance that it stands in: an index into [`BondGraph::tree`].
+    pub parent: Option<u32>,
+    /// Where it is declared.
+    pub span: Span,
+    /// Its ports by their names in the model, and their bonds.
+    pub ports: Vec<(String, BondId)>,
+    /// Its inputs.
+    pub inputs: Vec<SignalId>,
+    /// Its outputs.
+    pub outputs: Vec<SignalId>,
+    /// Its parameters in the order of the model.
+    pub parameters: Vec<InstanceParameter>,
+}
+
+/// A parameter of an instance.
+#[derive(Clone, Debug)]
+pub struct InstanceParameter {
+    /// Which.
+    pub id: ParameterId,
+    /// Its name in the model.
+    pub name: String,
+    /// Whether instances may set it.
+    pub public: bool,
+    /// Whether this one's value was given from outside, in the words of what is around.
+    pub given: bool,
+    /// The model's default, in the words of the model, where the value was given instead.
+    pub default: Option<Expr>,
 }
 
 /// A signal that regulates, and what for: nothing that a simulation needs, but what the design of its gains starts
@@ -430,6 +471,17 @@ pub struct Regulator {
     pub span: Span,
 }
 
+/// Instances by their names.
+pub struct Homes<'g>(HashMap<&'g str, u32>);
+
+impl Homes<'_> {
+    /// The innermost instance that a full name stands in, 0 for the file: an index into [`BondGraph::tree`].
+    pub fn of(&self, name: &str) -> u32 {
+        let outer = name.rsplit_once('.').and_then(|(outer, _)| self.0.get(outer));
+        outer.copied().unwrap_or(0)
+    }
+}
+
 impl BondGraph {
     /// The junction or element of an index.
     pub fn vertex(&self, id: VertexId) -> &Vertex {
@@ -439,6 +491,12 @@ impl BondGraph {
     /// The bond of an index.
     pub fn bond(&self, id: BondId) -> &Bond {
         &self.bonds[id.index()]
+    }
+
+    /// Finds the instance that a name stands in.
+    pub fn homes(&self) -> Homes<'_> {
+        let named = self.tree.iter().enumerate().skip(1);
+        Homes(named.map(|(k, instance)| (instance.name.as_str(), k as u32)).collect())
     }
 
     /// Where the file declares the instance that an element is a part of, however deep in it; `None` for the file's own.

@@ -3,6 +3,7 @@
 //! Signs (as SPICE): a branch current runs from the first node through the device to the second.
 
 pub mod waveform;
+pub mod sweep;
 pub mod devices;
 pub mod stamper;
 pub mod stamps;
@@ -10,6 +11,7 @@ pub mod stamps;
 use crate::expr;
 use crate::source::Span;
 use crate::trace::measure::Measure;
+pub use sweep::{Axis, Points};
 pub use waveform::Waveform;
 
 /// A node; 0 is ground.
@@ -30,8 +32,47 @@ pub enum Leaf {
     Voltage(NodeId, NodeId),
     /// The current through a device.
     Current(DeviceId),
+    /// A part of a phasor; elsewhere of a real number.
+    Part(Part, Probe),
     /// Time in seconds.
     Time,
+}
+
+/// A voltage or a current.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Probe {
+    /// v(a) − v(b).
+    Voltage(NodeId, NodeId),
+    /// The current through a device.
+    Current(DeviceId),
+}
+
+/// What is asked of a phasor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Part {
+    Real,
+    Imaginary,
+    Magnitude,
+    /// In radians.
+    Phase,
+    /// In degrees.
+    Degrees,
+    /// 20·log10 of the magnitude.
+    Decibel,
+}
+
+impl Part {
+    /// The function of SPICE that gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Part::Real => "re",
+            Part::Imaginary => "im",
+            Part::Magnitude => "mag",
+            Part::Phase | Part::Degrees => "ph",
+            Part::Decibel => "db",
+        }
+    }
 }
 
 /// A node's name and scale.
@@ -323,7 +364,7 @@ impl Default for DiodeInstance {
 }
 
 /// An output column.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// Its header, as the netlist writes it (`v(out)`).
     pub name: String,
@@ -332,11 +373,43 @@ pub struct Output {
 }
 
 /// What is to be computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Analysis {
     OperatingPoint,
-    Transient { step: f64, stop: f64, start: f64, hmax: Option<f64>, uic: bool },
+    Transient {
+        step: f64,
+        stop: f64,
+        start: f64,
+        hmax: Option<f64>,
+        uic: bool,
+    },
+    /// Operating points; the first axis runs fastest.
+    Dc {
+        axes: Vec<Axis>,
+    },
+    /// Phasors over frequencies in Hz.
+    Ac {
+        frequencies: Points,
+    },
+    /// Gain from a source to an output, and the resistances at both.
+    Transfer {
+        output: Output,
+        source: DeviceId,
+    },
+}
+
+impl Analysis {
+    /// What it is called: the word of its card and of `--analysis`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Analysis::OperatingPoint => "op",
+            Analysis::Transient { .. } => "tran",
+            Analysis::Dc { .. } => "dc",
+            Analysis::Ac { .. } => "ac",
+            Analysis::Transfer { .. } => "tf",
+        }
+    }
 }
 
 /// A flat circuit with what is to be computed on it.
@@ -358,6 +431,8 @@ pub struct Circuit {
     pub initial_holds: bool,
     /// What is to be computed, in netlist order.
     pub analyses: Vec<Analysis>,
+    /// Everything is computed at each of these values; the first axis runs fastest.
+    pub steps: Vec<Axis>,
     /// Output columns; empty means every node voltage and branch current.
     pub outputs: Vec<Output>,
     /// What is measured, over the columns of `watched`.

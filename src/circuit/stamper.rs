@@ -4,9 +4,11 @@ use super::devices::{self, Branch};
 use super::stamps::{
     Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
 };
-use super::{Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Parts, Quantity, Waveform};
+use super::{
+    Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
+};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{self, Binary};
+use crate::expr::{self, Binary, Function};
 
 /// A circuit on its way to its stamps.
 pub struct Stamper<'a> {
@@ -376,9 +378,18 @@ impl<'a> Stamper<'a> {
                 super::Leaf::Voltage(a, b) => voltage([self.node(*a), self.node(*b)]),
                 super::Leaf::Current(id) => self.current(*id).law(),
                 super::Leaf::Time => Law::leaf(Leaf::Time),
+                super::Leaf::Part(part, probe) => part_of_real(*part, self.probe(*probe)),
             };
             Law { span, ..law }
         })
+    }
+
+    /// A voltage or current as a law over unknowns.
+    fn probe(&self, probe: Probe) -> Law {
+        match probe {
+            Probe::Voltage(a, b) => voltage([self.node(a), self.node(b)]),
+            Probe::Current(id) => self.current(id).law(),
+        }
     }
 
     /// The value that `.ic` gives the voltage across two nodes, when it speaks of either.
@@ -400,6 +411,25 @@ impl<'a> Stamper<'a> {
     }
 }
 
+/// A part of a number that is real: its phase is 0, or π where it is negative.
+fn part_of_real(part: Part, law: Law) -> Law {
+    let negative = |law: Law, turned: f64| {
+        let condition = law.binary(Binary::Less, Law::number(0.0));
+        Law::choice(condition, Law::number(turned), Law::number(0.0))
+    };
+    match part {
+        Part::Real => law,
+        Part::Imaginary => Law::number(0.0),
+        Part::Magnitude => Law::call(Function::Abs, vec![law]),
+        Part::Phase => negative(law, std::f64::consts::PI),
+        Part::Degrees => negative(law, 180.0),
+        Part::Decibel => {
+            let logarithm = Law::call(Function::Log10, vec![Law::call(Function::Abs, vec![law])]);
+            Law::number(20.0).binary(Binary::Multiply, logarithm)
+        }
+    }
+}
+
 /// v(a) − v(b) as a law.
 pub fn voltage(across: [Option<UnknownId>; 2]) -> Law {
     let unknown = |id| Law::leaf(Leaf::Unknown(id));
@@ -416,7 +446,7 @@ pub fn voltage(across: [Option<UnknownId>; 2]) -> Law {
 fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
     fn mark(expr: &expr::Expr<super::Leaf>, marks: &mut [bool]) {
         expr.leaves(&mut |leaf, _| {
-            if let super::Leaf::Current(id) = leaf {
+            if let super::Leaf::Current(id) | super::Leaf::Part(_, Probe::Current(id)) = leaf {
                 marks[id.0 as usize] = true;
             }
         });

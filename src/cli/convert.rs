@@ -10,7 +10,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects;
 use crate::quantity::nearest;
 use crate::source::Span;
-use crate::translate::map::MapCard;
+use crate::translate::{self, map::MapCard};
 use std::path::Path;
 
 /// What it does, in a line.
@@ -39,6 +39,9 @@ pub struct Arguments {
     /// divided by the factor, flows multiplied)
     #[arg(long, value_name = "SCALES")]
     scale: Option<String>,
+    /// One flat circuit, instances laid open, instead of subcircuits
+    #[arg(long)]
+    flat: bool,
     /// Where to write the map: which circuit variable is which effort or flow
     #[arg(long, value_name = "FILE")]
     map: Option<String>,
@@ -80,13 +83,24 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
     let Some(model) = model else { return Err(session.exit()) };
+    let (netlist, mut map) = match arguments.flat || !dialect.nested {
+        true => (model.translation.netlist, model.translation.map),
+        false => {
+            let nested = translate::hierarchy::fold(
+                &model.graph,
+                &model.causality,
+                &session.map,
+                &model.translation,
+            );
+            (nested.netlist, nested.map)
+        }
+    };
     let mut d = vec![];
-    let written = dialect.write(&model.translation.netlist, &mut d);
+    let written = dialect.write(&netlist, &mut d);
     session.say(d);
     let Some(written) = written else { return Err(session.exit()) };
     write_text(arguments.output.as_deref(), &written.text, session)?;
     // The map holds what was added, too.
-    let mut map = model.translation.map;
     map.dialect = dialect.name;
     for (card, of) in written.senses {
         map.figures.nodes += 1;

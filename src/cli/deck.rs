@@ -4,9 +4,9 @@ use crate::bond::elaborate::Overrides;
 use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::expr;
+use crate::netlist::analysis::Print;
 use crate::netlist::dialects::Dialect;
-use crate::netlist::parts::map_leaves;
-use crate::netlist::{Card, CardKind, Expr, Leaf, Names, Netlist, read};
+use crate::netlist::{Card, CardKind, Expr, Names, Netlist, read};
 use crate::source::loader::edit_distance;
 use crate::source::{SourceMap, Span};
 
@@ -36,16 +36,7 @@ fn cards(
 
 /// An expression with the names of another netlist.
 fn adopt(expr: &Expr, from: &Names, to: &mut Names) -> Expr {
-    let mut name = |name| to.intern(from.text(name));
-    map_leaves(expr, &mut |leaf, _| {
-        expr::Expr::leaf(match leaf {
-            Leaf::Parameter(a) => Leaf::Parameter(name(*a)),
-            Leaf::Voltage(a, b) => Leaf::Voltage(name(*a), b.map(&mut name)),
-            Leaf::Current(a) => Leaf::Current(name(*a)),
-            // What is within operators has been mapped.
-            Leaf::Time | Leaf::Operator(..) => leaf.clone(),
-        })
-    })
+    expr.map(&mut |leaf, _| expr::Expr::leaf(leaf.renamed(&mut |name| to.intern(from.text(name)))))
 }
 
 /// Gives top-level parameters other values.
@@ -114,7 +105,7 @@ pub fn observe(netlist: &mut Netlist, list: Option<&str>, d: &mut Vec<Diagnostic
     netlist.cards.retain(|card| !matches!(card.kind, CardKind::Save { .. }));
     netlist.header.retain(|(key, _)| key != "column");
     if !items.is_empty() {
-        let kind = CardKind::Save { print: true, items };
+        let kind = CardKind::Save { of: Print::Any, items };
         netlist.cards.push(Card { kind, span: Span::NONE, comment: None });
     }
 }
@@ -145,7 +136,7 @@ pub fn set_times(circuit: &mut Circuit, overrides: &Overrides, d: &mut Vec<Diagn
     if let Some(until) = until {
         let transient = circuit.analyses.iter_mut().rev().find_map(|analysis| match analysis {
             Analysis::Transient { stop, .. } => Some(stop),
-            Analysis::OperatingPoint => None,
+            _ => None,
         });
         match transient {
             Some(stop) => *stop = until,

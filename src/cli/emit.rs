@@ -6,7 +6,7 @@ use crate::bond::graph::{
     StoreInitial, StoreLaw, Variable,
 };
 use crate::circuit::stamps::{self, Stamps};
-use crate::circuit::{self, Circuit, DeviceKind, LawOf, Quantity, Waveform};
+use crate::circuit::{self, Circuit, DeviceKind, LawOf, Probe, Quantity, Waveform};
 use crate::expr::print::{number, print};
 use crate::expr::{Dialect, Expr};
 
@@ -200,6 +200,12 @@ pub fn circuit(circuit: &Circuit) -> String {
             circuit::Leaf::Voltage(a, b) => format!("v({}, {})", node(*a), node(*b)),
             circuit::Leaf::Current(id) => format!("i({})", device(*id)),
             circuit::Leaf::Time => "time".into(),
+            circuit::Leaf::Part(part, Probe::Voltage(a, b)) => {
+                format!("{}(v({}, {}))", part.name(), node(*a), node(*b))
+            }
+            circuit::Leaf::Part(part, Probe::Current(id)) => {
+                format!("{}(i({}))", part.name(), device(*id))
+            }
         })
     };
     let start =

@@ -61,7 +61,10 @@ impl DeckFlags {
 }
 
 /// The dialect of a name that netlists are read in.
-fn dialect(name: &str) -> Result<&'static Dialect, Box<Diagnostic>> {
+///
+/// # Errors
+/// That there is none.
+pub fn dialect(name: &str) -> Result<&'static Dialect, Box<Diagnostic>> {
     let found = dialects::find(name).filter(|dialect| dialect.read.is_some());
     found.ok_or_else(|| {
         let message = format!("netlists in the dialect `{name}` are not read");

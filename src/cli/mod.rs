@@ -9,6 +9,7 @@ pub mod flags;
 pub mod watch;
 pub mod deck;
 pub mod pipeline;
+pub mod run;
 pub mod list;
 pub mod check;
 pub mod convert;

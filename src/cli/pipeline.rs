@@ -2,7 +2,7 @@
 
 use super::emit::{self, Stage};
 use super::flags::how;
-use super::measures::{self, Measured, Measuring};
+pub use super::run::{Run, prepare, ready, run_text};
 use super::session::{Exit, Session};
 use crate::bond::causality::{self, Causality};
 use crate::bond::elaborate::{self, Overrides};
@@ -10,19 +10,21 @@ use crate::bond::graph::{BondGraph, Observation};
 use crate::bond::initial::{self, InitialState};
 use crate::bond::scale;
 use crate::bond::syntax;
-use crate::circuit::stamps::{self, Stamps};
-use crate::circuit::{Analysis, Circuit};
+use crate::circuit::Circuit;
+use crate::circuit::stamps;
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
+use crate::netlist::analysis::{Analysis, Sweep};
+use crate::netlist::dialects::{Dialect, NGSPICE};
 use crate::netlist::header::Header;
 use crate::netlist::read::How;
-use crate::netlist::{Netlist, flatten, read, write};
+use crate::netlist::{CardKind, Netlist, flatten, read, write};
 use crate::quantity::{did_you_mean, nearest};
-use crate::sim::{self, Failure, FailureKind, Interval, Settings, Statistics, System};
+use crate::sim::{self, FailureKind, Settings};
 use crate::source::{FileId, SourceMap, Span};
-use crate::trace::measure::Measure;
-use crate::trace::{Sink, Trace};
+use crate::translate::hierarchy::{self, Hierarchy};
 use crate::translate::{self, Translation};
-use crate::verify::{self, Report};
+use crate::verify::{self, Report, Times};
+use std::time::Instant;
 
 /// What a text is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,6 +181,13 @@ pub fn model(
     Some(Model { graph, causality, initial, translation })
 }
 
+impl Model {
+    /// The circuit with the graph's instances as subcircuits.
+    pub fn nested(&self, map: &SourceMap) -> Hierarchy {
+        hierarchy::fold(&self.graph, &self.causality, map, &self.translation)
+    }
+}
+
 /// A thousand rows where only the end of the run is said.
 fn set_step(graph: &mut BondGraph, d: &mut Vec<Diagnostic>) {
     if let (Some(until), None) = (graph.experiment.until, graph.experiment.step) {
@@ -214,239 +223,98 @@ pub fn circuit(
     match language(map, file) {
         Language::Bond => model(map, file, overrides, d)?.circuit(d),
         Language::Netlist => {
-            let mut netlist = read::read(map, file, &how(overrides), d);
-            if has_errors(d) {
+            let deck = deck(map, file, overrides, d)?;
+            let circuit = deck.circuit(&[], None, d)?;
+            Some((circuit, deck.units))
+        }
+    }
+}
+
+/// A netlist with what the command line says of it: a circuit for any values of its sweeps.
+pub struct Deck {
+    /// The netlist.
+    pub netlist: Netlist,
+    /// Units of its columns.
+    pub units: Units,
+    overrides: Overrides,
+}
+
+/// From a netlist's text to cards.
+pub fn deck(
+    map: &mut SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Deck> {
+    let mut netlist = read::read(map, file, &how(overrides), d);
+    if has_errors(d) {
+        return None;
+    }
+    super::deck::set_parameters(&mut netlist, &overrides.set, d);
+    super::deck::observe(&mut netlist, overrides.observe.as_deref(), d);
+    if let Some(drive) = overrides.drive.first() {
+        let message = format!("a netlist has no input to drive: `{drive}`");
+        d.push(Diagnostic::error("E0944", Span::NONE, message));
+    }
+    let units = deck_units(&netlist);
+    Some(Deck { netlist, units, overrides: overrides.clone() })
+}
+
+impl Deck {
+    /// The flat circuit with some names set to other values, for an analysis other than the last where one is named.
+    pub fn circuit(
+        &self,
+        values: &[(&str, f64)],
+        analysis: Option<&str>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Circuit> {
+        let mut variation = flatten::Variation::default();
+        variation.analysis = analysis.map(String::from);
+        for (name, value) in values {
+            if let Err(error) = variation.set(&self.netlist, name, *value, self.place(name)) {
+                d.push(*error);
                 return None;
             }
-            super::deck::set_parameters(&mut netlist, &overrides.set, d);
-            super::deck::observe(&mut netlist, overrides.observe.as_deref(), d);
-            if let Some(drive) = overrides.drive.first() {
-                let message = format!("a netlist has no input to drive: `{drive}`");
-                d.push(Diagnostic::error("E0944", Span::NONE, message));
-            }
-            let units = deck_units(&netlist);
-            let mut circuit = flatten::flatten(&netlist, d)?;
-            super::deck::set_times(&mut circuit, overrides, d);
-            circuit.options.extend(overrides.options.iter().cloned());
-            (!has_errors(d)).then_some((circuit, units))
         }
+        let mut circuit = flatten::flatten_with(&self.netlist, &variation, d)?;
+        super::deck::set_times(&mut circuit, &self.overrides, d);
+        circuit.options.extend(self.overrides.options.iter().cloned());
+        (!has_errors(d)).then_some(circuit)
+    }
+
+    /// Where a sweep names something.
+    fn place(&self, name: &str) -> Span {
+        let sweeps = self.netlist.cards.iter().flat_map(|card| match &card.kind {
+            CardKind::Step(sweeps) | CardKind::Analysis(Analysis::Dc(sweeps)) => &sweeps[..],
+            _ => &[],
+        });
+        let mut places = sweeps.filter_map(|sweep| match sweep {
+            Sweep::Quantity { name: own, span, .. } | Sweep::Table { name: own, span } => {
+                let same = self.netlist.names.text(*own).eq_ignore_ascii_case(name);
+                let table = matches!(sweep, Sweep::Table { .. });
+                (same || table).then_some(*span)
+            }
+        });
+        places.next().unwrap_or(Span::NONE)
     }
 }
 
 /// Units of columns, by their names.
 pub type Units = Vec<(String, String)>;
 
-fn deck_units(netlist: &Netlist) -> Units {
+pub(super) fn deck_units(netlist: &Netlist) -> Units {
     let (header, _) = Header::read(&netlist.header);
     header.columns.into_iter().map(|column| (column.name, column.unit)).collect()
 }
 
 /// The unit of a column: as known, else as a node voltage or branch current has it.
-fn unit_of(name: &str, units: &Units) -> String {
+pub(super) fn unit_of(name: &str, units: &Units) -> String {
     let known = units.iter().find(|(known, _)| known == name);
     match known {
         Some((_, unit)) => unit.clone(),
         None if name.starts_with("v(") => "V".into(),
         None if name.starts_with("i(") => "A".into(),
         None => String::new(),
-    }
-}
-
-/// A circuit that is ready to run.
-pub struct Run {
-    /// The title of the netlist.
-    pub title: String,
-    /// Headers of the columns, time first.
-    pub names: Vec<String>,
-    /// Their units.
-    pub units: Vec<String>,
-    /// What the circuit comes down to.
-    pub stamps: Stamps,
-    /// The same, ready to be solved.
-    pub system: System,
-    /// How the transient is run; `None` for an operating point.
-    pub settings: Option<Settings>,
-    /// Analyses that the text asks for.
-    pub analyses: usize,
-    /// What is measured in the one that is run.
-    pub measures: Vec<Measure>,
-    /// Headers of all columns, those that are only measured included.
-    all: Vec<String>,
-}
-
-/// The analyses that can be picked with `--analysis`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Pick {
-    /// `.op`
-    Op,
-    /// `.tran`
-    Tran,
-}
-
-/// From a text to a circuit ready to run. Of several analyses the last, unless one is picked.
-pub fn prepare(
-    map: &mut SourceMap,
-    file: FileId,
-    overrides: &Overrides,
-    pick: Option<Pick>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Run> {
-    let native = language(map, file) == Language::Bond;
-    let (circuit, units) = circuit(map, file, overrides, d)?;
-    if native && circuit.analyses.is_empty() {
-        let message = "nothing says until when to simulate";
-        let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
-        d.push(Diagnostic::error("E0806", Span::NONE, message).help(help));
-        return None;
-    }
-    ready(circuit, &units, native, pick, d)
-}
-
-/// Makes a circuit ready to run. `native`: it comes from a bond graph.
-pub fn ready(
-    circuit: Circuit,
-    units: &Units,
-    native: bool,
-    pick: Option<Pick>,
-    d: &mut Vec<Diagnostic>,
-) -> Option<Run> {
-    let stamps = stamps::stamp(&circuit, d)?;
-    let point = match pick {
-        Some(pick) => pick == Pick::Op,
-        None => circuit.analyses.last() == Some(&Analysis::OperatingPoint),
-    };
-    let before = d.len();
-    let settings = if point { None } else { Some(Settings::of(&circuit, native, d)?) };
-    // What the file's own options are wrong about has been said at their place.
-    let (said, again) = d.split_at(before);
-    let again: Vec<_> = again.iter().filter(|d| !says(said, d)).cloned().collect();
-    d.truncate(before);
-    d.extend(again);
-    if let Some(settings) = &settings {
-        limit_rows(settings, d)?;
-    }
-    let system = sim::compile(&stamps, d)?;
-    let mut names: Vec<String> = if point { vec![] } else { vec!["time".into()] };
-    names.extend(stamps.outputs.iter().map(|(name, _)| name.clone()));
-    let all = names.clone();
-    names.truncate(measures::shown(&all));
-    let unit = |name: &String| if name == "time" { "s".into() } else { unit_of(name, units) };
-    let units = names.iter().map(unit).collect();
-    for (at, name) in names.iter().enumerate() {
-        if names[..at].contains(name) {
-            let message = format!("two columns are called `{name}`");
-            let help = "give one of them another name with `as`";
-            d.push(Diagnostic::error("E0945", Span::NONE, message).help(help));
-            return None;
-        }
-    }
-    let analyses = circuit.analyses.len();
-    let analysis = if point { "op" } else { "tran" };
-    let (measures, others): (Vec<_>, Vec<_>) = circuit
-        .measures
-        .into_iter()
-        .partition(|measure| measure.analysis.is_empty() || measure.analysis == analysis);
-    if let Some(other) = others.first() {
-        let message =
-            format!("measures of `{}` are not taken: `{analysis}` is run", other.analysis);
-        let warning = Diagnostic::warning("W0792", other.span, message);
-        d.push(warning.help("pick the analysis with --analysis"));
-    }
-    Some(Run {
-        title: circuit.title,
-        names,
-        units,
-        stamps,
-        system,
-        settings,
-        analyses,
-        measures,
-        all,
-    })
-}
-
-/// Whether a warning or error has been said, wherever.
-fn says(said: &[Diagnostic], diagnostic: &Diagnostic) -> bool {
-    said.iter().any(|d| (d.code, &d.message) == (diagnostic.code, &diagnostic.message))
-}
-
-/// More rows than this are a slip of the pen.
-const MOST_ROWS: f64 = 1e9;
-
-fn limit_rows(settings: &Settings, d: &mut Vec<Diagnostic>) -> Option<()> {
-    let Interval::Grid(step) = settings.rows else { return Some(()) };
-    let span = settings.stop - settings.start;
-    if span / step <= MOST_ROWS {
-        return Some(());
-    }
-    let message = format!("a row every {step:e} s for {span:e} s: that is more than 1e9 rows");
-    let error = Diagnostic::error("E0807", Span::NONE, message);
-    d.push(error.help("end the run earlier (--until), or give a longer output interval (--step)"));
-    None
-}
-
-impl Run {
-    /// Runs, and sends rows to a sink.
-    ///
-    /// # Errors
-    /// Why the run did not reach its end.
-    pub fn go(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
-        self.go_measured(sink).0
-    }
-
-    /// Runs, and sends rows to a sink; also tells what was measured.
-    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
-        let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
-        let mut measuring = Measuring::new(sink, &self.measures, &self.all, times);
-        let result = self.analyse(&mut measuring);
-        (result, measuring.finish())
-    }
-
-    fn analyse(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
-        match &self.settings {
-            Some(settings) => sim::transient(&self.system, settings, sink),
-            None => {
-                let point = sim::operating_point(&self.system)?;
-                sink.row(&point.outputs).map_err(|error| {
-                    let message = format!("the row cannot be written: {error}");
-                    Failure {
-                        kind: FailureKind::Output,
-                        diagnostic: Box::new(Diagnostic::error("E0905", Span::NONE, message)),
-                        time: 0.0,
-                        statistics: Box::new(point.statistics.clone()),
-                    }
-                })?;
-                Ok(point.statistics)
-            }
-        }
-    }
-
-    /// An empty trace with this run's columns.
-    pub fn trace(&self) -> Trace {
-        Trace::new(self.names.clone(), self.units.clone())
-    }
-}
-
-/// Runs a text from memory; its name's ending says what it is written in. For tests and small programs.
-///
-/// # Errors
-/// Everything that was said, errors and warnings.
-pub fn run_text(
-    name: &str,
-    text: &str,
-    overrides: &Overrides,
-) -> Result<(Trace, Statistics), Vec<Diagnostic>> {
-    let mut map = SourceMap::default();
-    let file = map.add(name, text);
-    let mut d = vec![];
-    let Some(run) = prepare(&mut map, file, overrides, None, &mut d) else { return Err(d) };
-    let mut trace = run.trace();
-    match run.go(&mut trace) {
-        Ok(statistics) => Ok((trace, statistics)),
-        Err(failure) => {
-            d.push(*failure.diagnostic);
-            Err(d)
-        }
     }
 }
 
@@ -498,6 +366,8 @@ pub struct Question {
     pub netlist: Option<FileId>,
     /// A map of it other than the translation's own, as JSON.
     pub map: Option<serde_json::Value>,
+    /// The dialect that the translation's own is written in, where that is not ngspice.
+    pub to: Option<&'static Dialect>,
     /// What random numbers follow from.
     pub seed: Option<u64>,
 }
@@ -523,12 +393,24 @@ pub fn verify(
         return Ok(None);
     }
     let Some(model) = model(map, file, overrides, d) else { return Ok(None) };
-    let Some((certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
+    let begin = Instant::now();
+    let Some((mut certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
     else {
         return Ok(None);
     };
+    if !model.graph.scales.is_empty() {
+        let plain = Overrides { scale: vec![], ..overrides.clone() };
+        let Some(plain) = self::model(map, file, &plain, &mut vec![]) else { return Ok(None) };
+        certificate.scaling = Some(verify::scaling(
+            [&plain.graph, &model.graph],
+            [&plain.initial, &model.initial],
+            &overrides.scale,
+            question.seed.unwrap_or(verify::SEED),
+        ));
+    }
+    let mut times = Times { text: begin.elapsed().as_secs_f64(), ..Times::default() };
     if !certificate.holds() || model.graph.experiment.until.is_none() {
-        return Ok(Some(Report::of_text(certificate)));
+        return Ok(Some(Report::of_text(certificate).timed(times)));
     }
     let circuit = flatten::flatten(&netlist, d).map(|mut circuit| {
         let given = overrides.options.iter();
@@ -543,14 +425,18 @@ pub fn verify(
         adapt(settings);
     }
     let mut trace = run.trace();
+    let begin = Instant::now();
     if let Err(failure) = run.go(&mut trace) {
         if failure.kind != FailureKind::Interrupted {
             d.push(*failure.diagnostic);
         }
         return Err(failure.kind);
     }
+    times.circuit = begin.elapsed().as_secs_f64();
+    let begin = Instant::now();
     let report = verify::judge(&model.graph, &model.causality, &trace, &demands, d);
-    Ok(report.map(|report| report.with(certificate)))
+    times.second = begin.elapsed().as_secs_f64();
+    Ok(report.map(|report| report.with(certificate).timed(times)))
 }
 
 /// The parts of the certificate that look at the text alone, and the netlist that was read from it.
@@ -561,18 +447,32 @@ pub fn certificate(
     how: &How,
     d: &mut Vec<Diagnostic>,
 ) -> Option<(verify::Certificate, Netlist)> {
-    let text = match question.netlist {
-        Some(file) => file,
+    let ours = &model.translation.netlist;
+    let netlist = match question.netlist {
+        Some(file) => read::read(map, file, how, d),
         None => {
-            let text = write::write(&model.translation.netlist);
-            map.add(format!("{}.cir", model.graph.name), text)
+            let dialect = question.to.unwrap_or(&NGSPICE);
+            let text = match dialect.nested {
+                true => dialect.write(&model.nested(map).netlist, d)?.text,
+                false => dialect.write(ours, d)?.text,
+            };
+            let file = map.add(format!("{}.cir", model.graph.name), text);
+            read::read(map, file, &How::of(dialect), d)
         }
     };
-    let netlist = read::read(map, text, how, d);
     if has_errors(d) {
         return None;
     }
     let mut translation = model.translation.clone();
+    // A text with subcircuits has other names than a flat one.
+    if netlist.cards.iter().any(|card| matches!(card.kind, CardKind::Subcircuit(_))) {
+        let nested = model.nested(map);
+        (translation.netlist, translation.map) = (nested.netlist, nested.map);
+    }
+    // What the dialect cannot say has been said; a text in it may stand for the model nevertheless.
+    if let Some(written) = netlist.dialect.write(&translation.netlist, &mut vec![]) {
+        translation.netlist = written.netlist;
+    }
     if let Some(json) = &question.map {
         match translate::Map::from_json(json, &mut translation.netlist.names) {
             Some(map) => {

@@ -188,7 +188,7 @@ impl Session {
 pub fn exit_of(code: &str) -> Exit {
     match (code.get(1..3), code.get(3..5)) {
         // Nothing to run, or an option that makes no sense: said before anything runs.
-        (Some("08"), Some("06" | "07" | "16" | "17" | "18")) => Exit::Input,
+        (Some("08"), Some("06" | "07" | "10" | "16" | "17" | "18")) => Exit::Input,
         (Some("08"), _) => Exit::Simulation,
         (Some("09"), Some(number)) if number < "20" => Exit::File,
         (Some("09"), Some(number)) if number >= "40" => Exit::Usage,

@@ -5,12 +5,13 @@ use super::flags::{DeckFlags, ModelFlags};
 use super::list;
 use super::measures;
 use super::output::{Output, write_text};
-use super::pipeline::{self, Pick, Run};
+use super::pipeline::{self, Run};
 use super::session::{Exit, Session};
 use super::watch::{self, Bar};
 use crate::bond::elaborate::Overrides;
+use crate::circuit::{Analysis, Points};
 use crate::diagnostic::Diagnostic;
-use crate::sim::{FailureKind, Interval, Settings, Statistics};
+use crate::sim::{FailureKind, Interval, Progress, Settings, Statistics};
 use crate::source::{FileId, Span};
 use crate::trace::Sink;
 use crate::trace::formats::Heading;
@@ -40,12 +41,12 @@ pub struct Arguments {
     /// Head columns as `name [unit]`
     #[arg(long)]
     units: bool,
-    /// Rows at exactly these times, one a line, in seconds
+    /// Rows at exactly these times, one a line, in seconds; in .ac at these frequencies in Hz
     #[arg(long, value_name = "FILE", conflicts_with = "step")]
     times: Option<String>,
-    /// Which analysis of a netlist to run; without it the last
-    #[arg(long, value_enum, value_name = "KIND")]
-    analysis: Option<Pick>,
+    /// Which analysis of a netlist to run (op, dc, ac, tf, tran); without it the last
+    #[arg(long, value_name = "KIND")]
+    analysis: Option<String>,
     #[command(flatten)]
     deck: DeckFlags,
     /// Print a stage on the way instead of running
@@ -85,8 +86,16 @@ fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> 
     }
     let times = arguments.times.as_deref().map(|name| read_times(name, session)).transpose()?;
     let mut run = prepare(arguments, file, &overrides, session)?;
-    if let (Some(times), Some(settings)) = (times, &mut run.settings) {
-        set_times(times, settings).map_err(|error| session.fail(*error))?;
+    if let Some(times) = times {
+        match (&mut run.analysis, &mut run.settings) {
+            (Analysis::Ac { frequencies }, _) => {
+                *frequencies = Points::Rows(times.into_iter().map(|f| vec![f]).collect());
+            }
+            (_, Some(settings)) => {
+                set_times(times, settings).map_err(|error| session.fail(*error))?;
+            }
+            _ => {}
+        }
     }
     go(arguments, &mut run, session)
 }
@@ -98,11 +107,12 @@ fn prepare(
     session: &mut Session,
 ) -> Result<Run, Exit> {
     let mut d = vec![];
-    let run = pipeline::prepare(&mut session.map, file, overrides, arguments.analysis, &mut d);
+    let pick = arguments.analysis.as_deref().map(str::to_lowercase);
+    let run = pipeline::prepare(&mut session.map, file, overrides, pick.as_deref(), &mut d);
     session.say(d);
     let Some(run) = run else { return Err(session.exit()) };
     if run.analyses > 1 && arguments.analysis.is_none() {
-        let which = if run.settings.is_some() { "tran" } else { "op" };
+        let which = run.analysis.name();
         let message = format!("of {} analyses the last is run, `{which}`", run.analyses);
         let note = Diagnostic::note("N0946", Span::NONE, message);
         session.say([note.help("pick another with --analysis")]);
@@ -116,9 +126,8 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     let output = Output::open(to, format, heading, &run.names, &run.units, session)?;
     let mut output = Noting { to: output, error: None };
     let bar = Bar::new(session.global.quiet);
-    if let Some(settings) = &mut run.settings {
-        watch(settings, bar.clone());
-    }
+    let progress = bar.clone().map(|bar| Arc::new(move |part| bar.show(part)) as Progress);
+    run.watch(watch::stop_flag(), progress);
     let (result, measured) = run.go_measured(&mut output);
     if let Some(bar) = bar {
         bar.clear();
@@ -138,6 +147,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
                 (FailureKind::Interrupted, _) => Exit::Interrupted,
                 (FailureKind::Output, _) => Exit::File,
                 (FailureKind::NotSolved, _) => Exit::Simulation,
+                (FailureKind::Input, _) => Exit::Input,
             };
             session.say(failure.statistics.warnings.clone());
             if failure.kind == FailureKind::Interrupted {
@@ -149,13 +159,6 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
             say_statistics(arguments, &failure.statistics, session);
             Err(exit)
         }
-    }
-}
-
-fn watch(settings: &mut Settings, bar: Option<Arc<Bar>>) {
-    settings.interrupt = Some(watch::stop_flag());
-    if let Some(bar) = bar {
-        settings.progress = Some(Arc::new(move |part| bar.show(part)));
     }
 }
 

@@ -186,7 +186,10 @@ fn column(trace: &Trace, netlist: &Netlist, law: &netlist::Expr) -> Result<Vec<f
                 let name = netlist.names.text(*device).to_lowercase();
                 [Some(named(&format!("i({name})"))?), None]
             }
-            Leaf::Parameter(name) => return Err(netlist.names.text(*name).to_string()),
+            Leaf::Parameter(name) | Leaf::Power(name) => {
+                return Err(netlist.names.text(*name).to_string());
+            }
+            Leaf::Part(part, _) => return Err(part.name().to_string()),
             Leaf::Time => [Some(trace.time()), None],
             Leaf::Operator(..) => return Err("a value of the past".to_string()),
         });

@@ -1,12 +1,13 @@
 //! `bondspice verify MODEL.bg`: the certificate of a netlist's text, the circuit's run against the bond graph's own
 //! equations, and the balance of energy.
 
-use super::flags::{DeckFlags, ReportFlags};
+use super::flags::{DeckFlags, ReportFlags, dialect};
 use super::output::write_text;
 use super::pipeline::{self, Question};
 use super::session::{Exit, Session};
 use super::watch::{self, Bar};
 use crate::bond::elaborate::Overrides;
+use crate::bond::scale;
 use crate::sim::FailureKind;
 use crate::source::FileId;
 use crate::verify::Report;
@@ -19,7 +20,8 @@ pub const ABOUT: &str = "Prove a netlist against its bond graph: 0 right, 1 not"
 pub const EXAMPLE: &str = "The netlist's text is read back and its equations are solved exactly, over prime fields with random \
 parameters, beside those of the bond graph; laws, values and waveforms are compared; then both are simulated, and the \
 energy balance must close.\n\nExample: bondspice verify model.bg --format json\n         \
-bondspice verify model.bg --netlist edited.cir";
+bondspice verify model.bg --netlist edited.cir\n         \
+bondspice verify model.bg --to xyce --scale auto";
 
 /// Its flags.
 #[derive(clap::Args)]
@@ -34,6 +36,15 @@ pub struct Arguments {
     /// The map of that netlist, as `convert --map` writes it; the bond graph's own map without it
     #[arg(long, value_name = "FILE", requires = "netlist")]
     map: Option<String>,
+    /// The dialect in which the bond graph's own netlist is written and read back: ngspice, xyce, ltspice, gnucap
+    #[arg(long, value_name = "SIMULATOR", conflicts_with = "netlist")]
+    to: Option<String>,
+    /// Scale domains, as `convert` does; the scaled graph is proven against the unscaled one besides
+    #[arg(long, value_name = "SCALES")]
+    scale: Option<String>,
+    /// What each part took, on stderr
+    #[arg(long, value_name = "FORM", value_parser = ["json", "text"])]
+    stats: Option<String>,
     /// What the random numbers follow from
     #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
@@ -50,6 +61,11 @@ fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
     let flags = &arguments.report;
     let mut overrides = flags.model.overrides(session)?;
     arguments.deck.add_to(&mut overrides, session)?;
+    if let Some(scales) = &arguments.scale {
+        overrides.scale = scale::parse(scales).map_err(|error| session.fail(*error))?;
+    }
+    let to = arguments.to.as_deref().map(dialect).transpose();
+    let to = to.map_err(|error| session.fail(*error))?;
     let file = session.load(&flags.file)?;
     let netlist = arguments.netlist.as_deref().map(|path| session.load(path)).transpose()?;
     let map = match arguments.map.as_deref() {
@@ -61,8 +77,16 @@ fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         }
         None => None,
     };
-    let question = Question { netlist, map, seed: arguments.seed };
+    let question = Question { netlist, map, to, seed: arguments.seed };
     let report = report(file, &overrides, &question, session)?;
+    match arguments.stats.as_deref() {
+        Some("json") => eprintln!("{}", report.times.to_json(&report)),
+        Some(_) => eprint!("{}", report.times.text(&report)),
+        None if session.global.verbose && !session.global.quiet => {
+            eprint!("{}", report.times.text(&report));
+        }
+        None => {}
+    }
     let text = match flags.format.as_str() {
         "json" => format!("{}\n", report.json()),
         _ => report.text(),

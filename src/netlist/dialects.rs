@@ -31,6 +31,12 @@ pub struct Dialect {
     pub phases: bool,
     /// What models of switches are called.
     pub switches: Switches,
+    /// What stands between the names of a path into subcircuits.
+    pub separator: &'static str,
+    /// Whether the current of a device in a subcircuit goes by its letter, then the path.
+    pub lettered: bool,
+    /// Whether it takes subcircuits with parameters; else circuits are written flat.
+    pub nested: bool,
     /// What it cannot say.
     pub lacks: &'static [adapt::Lack],
     /// Writes a netlist that has been put in its words, where that is done. `None`, with errors, for what has none after all.
@@ -98,6 +104,9 @@ pub const NGSPICE: Dialect = Dialect {
     linked_to_any: true,
     phases: true,
     switches: Switches::Threshold,
+    separator: ".",
+    lettered: true,
+    nested: true,
     lacks: &[
         lacks::FLUX,
         lacks::INTEGRAL,
@@ -140,6 +149,8 @@ pub const DIALECTS: &[Dialect] = &[
         options: (Some("timeint"), &["newlte=3"]),
         linked_to_any: false,
         switches: Switches::Smooth,
+        separator: ":",
+        lettered: false,
         lacks: &[
             adapt::CHARGED_LINE,
             adapt::SWITCHING_HYSTERESIS,
@@ -167,6 +178,8 @@ pub const DIALECTS: &[Dialect] = &[
         // Every point in double precision, none thinned out for plots.
         options: (None, &["numdgt=15", "plotwinsize=0"]),
         linked_to_any: false,
+        separator: ":",
+        lettered: false,
         lacks: &[
             adapt::CHARGED_LINE,
             lacks::CAPACITOR_LAW,
@@ -199,6 +212,7 @@ pub const DIALECTS: &[Dialect] = &[
         options: (None, &["short=1e-9", "gmin=1e-20", "abstol=1e-18", "chgtol=1e-25", "numdgt=9"]),
         linked_to_any: false,
         phases: false,
+        nested: false,
         lacks: &[
             adapt::LAW,
             adapt::SWITCH,
@@ -218,6 +232,7 @@ pub const DIALECTS: &[Dialect] = &[
     Dialect {
         name: "saber",
         about: "Saber MAST, own templates only, by public notes on the language; untested",
+        nested: false,
         lacks: mast::LACKS,
         text: Some(mast::text),
         read: None,

@@ -3,6 +3,8 @@
 pub mod names;
 pub mod visit;
 pub mod parts;
+pub mod analysis;
+pub mod references;
 pub mod header;
 pub mod read;
 pub mod write;
@@ -12,8 +14,10 @@ pub mod adapt;
 pub mod lacks;
 pub mod mast;
 
+pub use crate::circuit::Part;
 use crate::expr;
 use crate::source::Span;
+use analysis::{Analysis, Data, Print, Sweep};
 pub use names::{Name, Names};
 pub use parts::{Operator, Passive, PassiveKind};
 
@@ -29,10 +33,36 @@ pub enum Leaf {
     Voltage(Name, Option<Name>),
     /// i(device).
     Current(Name),
+    /// The power that a device takes up, v·i: `p(device)` in outputs.
+    Power(Name),
+    /// A part of a phasor, of one of the above: `vdb(out)`, `im(v1)` in outputs.
+    Part(Part, Box<Leaf>),
     /// Time in seconds.
     Time,
     /// What follows from values over time.
     Operator(Operator, Vec<Expr>),
+}
+
+impl Leaf {
+    /// The same with other names.
+    pub fn renamed(&self, name: &mut dyn FnMut(Name) -> Name) -> Leaf {
+        match self {
+            Leaf::Parameter(a) => Leaf::Parameter(name(*a)),
+            Leaf::Voltage(a, b) => Leaf::Voltage(name(*a), b.map(&mut *name)),
+            Leaf::Current(a) => Leaf::Current(name(*a)),
+            Leaf::Power(a) => Leaf::Power(name(*a)),
+            Leaf::Part(part, inner) => Leaf::Part(*part, Box::new(inner.renamed(name))),
+            Leaf::Time => Leaf::Time,
+            Leaf::Operator(operator, arguments) => {
+                let mut renamed = |argument: &Expr| {
+                    argument.map(&mut |leaf, span| {
+                        Expr::new(expr::Node::Leaf(leaf.renamed(&mut *name)), span)
+                    })
+                };
+                Leaf::Operator(*operator, arguments.iter().map(&mut renamed).collect())
+            }
+        }
+    }
 }
 
 /// A card and the place that it came from: its line in the netlist, or in the `.bg` file for one that was translated.
@@ -78,8 +108,8 @@ pub enum CardKind {
     Choice(Vec<Branch>),
     /// `.save` or `.print tran`: the items as written and read.
     Save {
-        /// Whether it was `.print`.
-        print: bool,
+        /// The analysis that a `.print` belongs to.
+        of: Print,
         /// As written, and what it means.
         items: Vec<(String, Expr)>,
     },
@@ -90,6 +120,12 @@ pub enum CardKind {
     OperatingPoint,
     /// `.measure`.
     Measure(Measure),
+    /// `.dc`, `.ac`, `.tf` and the others.
+    Analysis(Analysis),
+    /// `.step`: everything is run at each of these values; the first of all `.step` runs fastest.
+    Step(Vec<Sweep>),
+    /// `.data`: values for sweeps.
+    Data(Data),
     /// A whole-line comment, without the asterisk.
     Comment(String),
 }

@@ -39,6 +39,14 @@ impl Names {
         }
     }
 
+    /// A new name of a text, whether or not another is spelled alike but for case. `find` goes on giving the first, so
+    /// that this is for netlists that are to be written, not looked up in.
+    pub fn add(&mut self, text: &str) -> Name {
+        self.text.push_str(text);
+        self.ends.push((self.text.len(), hash(text)));
+        Name(self.ends.len() as u32 - 1)
+    }
+
     /// The name of a text that has been seen before.
     pub fn find(&self, text: &str) -> Option<Name> {
         if self.slots.is_empty() { None } else { self.slot(text, hash(text)).ok() }

@@ -52,6 +52,8 @@ pub enum Operator {
     Transfer,
     /// `spice_pulse(…)` and the like: a waveform of numbers.
     Waveform(super::Shape),
+    /// `table(x, x0, y0, …)` whose points follow from parameters; with plain numbers it is a curve from the start.
+    Table,
 }
 
 /// Every leaf of an expression, those within operators too.

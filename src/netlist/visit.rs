@@ -25,6 +25,9 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
         CardKind::Measure(measure) => measure_mut(&mut measure.kind, visit),
+        CardKind::Analysis(analysis) => super::analysis::expressions_mut(analysis, visit),
+        CardKind::Step(sweeps) => super::analysis::sweeps_mut(sweeps, visit),
+        CardKind::Data(data) => data.values.iter_mut().for_each(visit),
         CardKind::Function(_)
         | CardKind::Global(_)
         | CardKind::Options(_)
@@ -59,7 +62,8 @@ fn source_mut(source: &mut Source, visit: &mut dyn FnMut(&mut Expr)) {
     source.dc.iter_mut().chain(source.ac.iter_mut().flatten()).for_each(visit);
 }
 
-fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
+/// The same for each of a device.
+pub(super) fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) {
     match &mut device.element {
         Element::Resistor { value } => visit(value),
         Element::Capacitor { value, initial } | Element::Inductor { value, initial } => {

@@ -4,6 +4,7 @@
 //! Lines stay under 80 columns: a longer card goes on behind `+`, broken at blanks. Numbers carry no suffix. A card's
 //! comment stands at the end of its line where there is room, else on a line above.
 
+use super::analysis::Print;
 use super::dialects::{Comments, Dialect, NGSPICE};
 use super::parts::{Operator, varies};
 use super::{
@@ -40,6 +41,7 @@ impl Form<'_> {
             Operator::Integral => "sdt".to_string(),
             Operator::Delay => "delay".to_string(),
             Operator::Transfer => "laplace".to_string(),
+            Operator::Table => "table".to_string(),
             Operator::Waveform(shape) => format!("spice_{}", read::waveforms::row(shape).name),
         };
         let arguments: Vec<String> = arguments.iter().map(|a| self.expression(a)).collect();
@@ -50,17 +52,47 @@ impl Form<'_> {
         self.names.text(name).to_string()
     }
 
+    /// A name that may lead into subcircuits.
+    fn inside(&self, name: Name) -> String {
+        self.names.text(name).replace('.', self.dialect.separator)
+    }
+
     fn expression(&self, expr: &Expr) -> String {
-        print(expr, self.dialect.spelling, &mut |leaf| match leaf {
+        print(expr, self.dialect.spelling, &mut |leaf| self.leaf(leaf))
+    }
+
+    fn spelling(&self) -> super::analysis::Spelling<'_> {
+        super::analysis::Spelling { names: self.names, value: Box::new(|expr| value(*self, expr)) }
+    }
+
+    fn leaf(&self, leaf: &Leaf) -> String {
+        match leaf {
             Leaf::Parameter(name) => self.name(*name),
-            Leaf::Voltage(plus, None) => format!("v({})", self.name(*plus)),
+            Leaf::Voltage(plus, None) => format!("v({})", self.inside(*plus)),
             Leaf::Voltage(plus, Some(minus)) => {
-                format!("v({},{})", self.name(*plus), self.name(*minus))
+                format!("v({},{})", self.inside(*plus), self.inside(*minus))
             }
-            Leaf::Current(device) => format!("i({})", self.name(*device)),
+            Leaf::Current(device) => match self.dialect.lettered {
+                true => format!("i({})", lettered(self.names.text(*device))),
+                false => format!("i({})", self.inside(*device)),
+            },
+            Leaf::Power(device) => format!("p({})", self.inside(*device)),
+            Leaf::Part(part, inner) => format!("{}({})", part.name(), self.leaf(inner)),
             Leaf::Time => "time".to_string(),
             Leaf::Operator(operator, arguments) => self.operator(*operator, arguments),
-        })
+        }
+    }
+}
+
+/// A device in a subcircuit as ngspice calls it: `h.X_motor.H_emf`, its letter before the path.
+fn lettered(name: &str) -> String {
+    let Some((path, own)) = name.rsplit_once('.') else { return name.to_string() };
+    let letter = own.get(..1).unwrap_or("").to_lowercase();
+    let first = path.split('.').next().unwrap_or("");
+    // Names that were read stand so already.
+    match first.eq_ignore_ascii_case(&letter) {
+        true => name.to_string(),
+        false => format!("{letter}.{name}"),
     }
 }
 
@@ -95,7 +127,7 @@ fn cards(text: &mut String, form: Form, cards: &[Card]) {
             CardKind::Subcircuit(subcircuit) => {
                 let mut words = vec![".subckt".to_string(), form.name(subcircuit.name)];
                 words.extend(subcircuit.ports.iter().map(|port| form.name(*port)));
-                words.extend(assignments(form, &subcircuit.parameters));
+                words.extend(given(form, &subcircuit.parameters));
                 line(text, &words, card.comment.as_deref(), form.dialect.comments);
                 self::cards(text, form, &subcircuit.cards);
                 line(
@@ -161,13 +193,17 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             )
             .collect()
         }
-        CardKind::Save { print, items } => {
-            let saves = if *print { form.dialect.print } else { form.dialect.save };
+        CardKind::Save { of, items } => {
+            let saves = if *of == Print::Any { form.dialect.save } else { form.dialect.print };
             if saves.is_empty() {
                 return vec![];
             }
-            let mut words: Vec<String> = saves.split(' ').map(word).collect();
-            words.extend(items.iter().map(|(text, _)| text.clone()));
+            let mut words: Vec<String> =
+                saves.replace("tran", of.word()).split(' ').map(word).collect();
+            words.extend(items.iter().map(|(text, expr)| match text.contains('.') {
+                true => form.expression(expr),
+                false => text.clone(),
+            }));
             words
         }
         CardKind::Transient { step, stop, start, hmax, uic } => {
@@ -181,6 +217,9 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
         }
         CardKind::OperatingPoint => vec![word(".op")],
         CardKind::Measure(measure) => vec![word(".measure"), measure.text.clone()],
+        CardKind::Analysis(analysis) => form.spelling().analysis(analysis),
+        CardKind::Step(sweeps) => form.spelling().sweeps(".step", sweeps),
+        CardKind::Data(data) => form.spelling().data(data),
         CardKind::Comment(_)
         | CardKind::Subcircuit(_)
         | CardKind::Choice(_)
@@ -273,7 +312,7 @@ fn device_words(form: Form, device: &Device) -> Vec<String> {
         }
         Element::Instance { subcircuit, parameters } => {
             words.push(name(subcircuit));
-            words.extend(assignments(form, parameters));
+            words.extend(given(form, parameters));
         }
     }
     words
@@ -341,6 +380,12 @@ fn size(form: Form, letter: &str, expr: &Expr) -> String {
 /// `key=value` of parameters.
 fn keyed(form: Form, parameters: &[(String, Expr)]) -> Vec<String> {
     parameters.iter().map(|(key, expr)| format!("{key}={}", value(form, expr))).collect()
+}
+
+/// Parameters of a subcircuit.
+fn given(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {
+    let begin = (!parameters.is_empty()).then(|| "PARAMS:".to_string());
+    begin.into_iter().chain(assignments(form, parameters)).collect()
 }
 
 fn assignments(form: Form, parameters: &[(Name, Expr)]) -> Vec<String> {

@@ -8,20 +8,21 @@ pub mod energy;
 pub mod events;
 mod memories;
 pub mod radau;
+mod rounding;
 
 use crate::bond::causality::Causality;
 use crate::bond::consistent;
+use crate::bond::equations::Unknown;
 use crate::bond::equations::compiled::{Compiled, Readings};
-use crate::bond::equations::{Formula, Input, Unknown};
 use crate::bond::graph::BondGraph;
 use crate::bond::initial;
 use crate::bond::prepared::{self, Prepared};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Node, Unary};
 use energy::{Energy, Meter};
 use events::Conditions;
 use memories::Memories;
 use radau::{B, Radau, Statistics, Step, Stop, Verdict};
+use rounding::Rounding;
 
 /// How to run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +46,7 @@ pub struct Run {
     pub names: Vec<String>,
     /// Their values at the times asked for, in the units of the observed items; at a jump those just after it.
     pub columns: Vec<Vec<f64>>,
-    /// Of each column a magnitude that is still rounding of 0: a small part of the largest variable of its kind.
+    /// Of each column a magnitude that is still rounding of 0: a small part of what the terms that make it are.
     pub least: Vec<f64>,
     /// The balance of energy over the run.
     pub energy: Energy,
@@ -160,8 +161,9 @@ pub fn integrate(
         return None;
     }
     run.least = vec![0.0; run.names.len()];
+    let rounding = Rounding::new(graph, &prepared.equations, &sizes, until);
     for ((least, formula), factor) in run.least[1..].iter_mut().zip(&formulas).zip(&factors) {
-        *least = sizes.least(formula) / factor;
+        *least = rounding.least(formula) / factor.abs();
     }
     run.energy =
         energy::balance(graph, &prepared.equations, &meter.work, meter.moved, &start, &end);
@@ -376,21 +378,6 @@ impl Sizes {
             }
         }
         largest
-    }
-
-    /// For an effort or a flow by itself, the magnitude below which it is what rounding leaves of 0.
-    fn least(&self, formula: &Formula) -> f64 {
-        let unknown = match &*formula.node {
-            Node::Unary(Unary::Negate, inner) => inner,
-            _ => formula,
-        };
-        match &*unknown.node {
-            Node::Leaf(Input::Unknown(k)) => match self.kind[*k as usize] {
-                Kind::Power(kind) => ROUNDING * self.largest_of_kinds()[kind],
-                Kind::Other => 0.0,
-            },
-            _ => 0.0,
-        }
     }
 
     /// The error allowed: the tolerance times the size, and not less than a hundred-millionth of that of the largest

@@ -18,7 +18,18 @@ use std::collections::BTreeMap;
 /// Compiles a circuit's stamps. `None` with diagnostics when no values of its parts could make it solvable: a floating
 /// node, a loop of voltage sources.
 pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
+    compile_for(stamps, false, d)
+}
+
+/// Compiles a circuit's stamps for linearising: every charge stays an entity of its own, since sources that do not move
+/// over time do so in phasors, and output columns and what is delayed have derivatives.
+pub(super) fn compile_linear(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
+    compile_for(stamps, true, d)
+}
+
+fn compile_for(stamps: &Stamps, linear: bool, d: &mut Vec<Diagnostic>) -> Option<System> {
     let mut builder = Builder::new(stamps);
+    builder.linear = linear;
     for (k, charge) in stamps.charges.iter().enumerate() {
         for (unknown, value) in &charge.linear {
             builder.charge_entries.push((k as u32, unknown.0, *value));
@@ -33,7 +44,9 @@ pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
         builder.conductances.push((row, row, 1.0));
     }
     builder.place_laws();
-    builder.reduce();
+    if !linear {
+        builder.reduce();
+    }
     let system = builder.finish();
     match structure::check(&system) {
         Ok(()) => Some(system),
@@ -53,6 +66,8 @@ struct Placed {
 
 struct Builder<'a> {
     stamps: &'a Stamps,
+    /// Output columns and what is delayed have derivatives.
+    linear: bool,
     unknowns: Vec<Unknown>,
     /// The unknown added for each charge whose rate laws speak of.
     rate_unknowns: BTreeMap<u32, u32>,
@@ -73,6 +88,7 @@ impl<'a> Builder<'a> {
         let mut builder = Builder {
             conditions: Conditions::new(time, time + 1 + stamps.modes.len() as u32),
             stamps,
+            linear: false,
             unknowns: stamps.unknowns.clone(),
             rate_unknowns: BTreeMap::new(),
             conductances: stamps.conductances.iter().map(|(r, c, v)| (r.0, c.0, *v)).collect(),
@@ -215,7 +231,7 @@ impl<'a> Builder<'a> {
         let n = self.unknowns.len();
         let mut slopes: Vec<(u32, u32)> = vec![];
         // Laws of time or of modes alone have no slope, and yet they move what stands in their equations.
-        let mut lawful = vec![];
+        let mut lawful: Vec<u32> = vec![];
         let mut curved_charges = vec![];
         for (dag, laws, _) in &self.groups {
             for law in laws {
@@ -341,7 +357,10 @@ impl<'a> Builder<'a> {
         let inputs = |leaf: &Leaf| self.input(leaf, first_rate);
         let nodes: Vec<NodeId> =
             columns.iter().map(|(_, law)| conditions.add_output(&mut dag, law, &inputs)).collect();
-        let output_laws = LawSet::without_derivatives(&dag, &nodes);
+        let output_laws = match self.linear {
+            true => LawSet::new(&mut dag, &nodes, (time + 1 + mode_slots + charges) as u32),
+            false => LawSet::without_derivatives(&dag, &nodes),
+        };
         let mut dag = Dag::default();
         let inputs = stamps.memories.iter().map(|memory| {
             let added: Result<NodeId, std::convert::Infallible> =
@@ -356,7 +375,10 @@ impl<'a> Builder<'a> {
             node
         });
         let inputs: Vec<NodeId> = inputs.collect();
-        let memory_inputs = LawSet::without_derivatives(&dag, &inputs);
+        let memory_inputs = match self.linear {
+            true => LawSet::new(&mut dag, &inputs, n as u32),
+            false => LawSet::without_derivatives(&dag, &inputs),
+        };
         let memories = stamps
             .memories
             .iter()
@@ -392,6 +414,8 @@ impl<'a> Builder<'a> {
                 .sources
                 .iter()
                 .map(|source| Source {
+                    device: source.device,
+                    parts: source.parts,
                     waveform: source.waveform.clone(),
                     into: source.into.iter().map(|(row, factor)| (row.0, *factor)).collect(),
                 })

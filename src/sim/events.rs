@@ -181,6 +181,15 @@ impl Network<'_> {
         self.statistics.events = 0;
     }
 
+    /// Lets conditions follow their guards again; switches stay as they are.
+    pub(crate) fn free_conditions(&mut self) {
+        for mode in 0..self.system.modes.len() {
+            if self.is_condition(mode) {
+                self.set_hold(mode, FREE);
+            }
+        }
+    }
+
     /// Sets the conditions over time to what they are just after `t`, those included that change within `slack` after
     /// it; without `slack` all of them for the first time.
     pub(crate) fn set_clocks(&mut self, t: f64, slack: Option<f64>) {

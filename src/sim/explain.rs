@@ -21,6 +21,8 @@ pub enum FailureKind {
     Interrupted,
     /// Rows could not be written: exit code 5.
     Output,
+    /// Values of a sweep for which there is no circuit: exit code 3.
+    Input,
 }
 
 /// A run that did not reach its end.
@@ -34,6 +36,14 @@ pub struct Failure {
     pub time: f64,
     /// What was done until then.
     pub statistics: Box<Statistics>,
+}
+
+impl Failure {
+    /// A failure at no time of a run.
+    pub fn new(kind: FailureKind, diagnostic: Diagnostic, statistics: &Statistics) -> Failure {
+        let statistics = Box::new(statistics.clone());
+        Failure { kind, diagnostic: Box::new(diagnostic), time: 0.0, statistics }
+    }
 }
 
 impl fmt::Display for Failure {

@@ -53,6 +53,11 @@ impl LawSet {
         Registers { values: self.values.registers(), full: self.full.registers() }
     }
 
+    /// Number of laws.
+    pub fn len(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
     /// Number of partial derivatives.
     pub fn partials(&self) -> usize {
         self.inputs.len()

@@ -1,20 +1,25 @@
 //! The simulator: Stamps → System → rows of a trace.
 //!
-//! [`compile`] once; then [`transient`] or [`operating_point`], as often as wanted. Nothing in here knows text: options
+//! [`compile`] once; then an analysis of the table [`ANALYSES`], as often as wanted. Nothing in here knows text: options
 //! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
 
+mod ac;
+pub mod analyses;
 mod clocks;
 mod compile;
 mod conditions;
+mod dc;
 mod events;
 mod explain;
 mod laws;
+mod linearise;
 mod memory;
 pub mod methods;
 mod network;
 mod newton;
 mod op;
 mod output;
+mod phasor;
 mod reduce;
 mod remarks;
 mod search;
@@ -23,15 +28,18 @@ mod statistics;
 mod step;
 mod structure;
 mod system;
+mod transfer;
 #[cfg(test)]
 mod tests;
 mod ties;
 
 pub use crate::circuit::stamps::UnknownId;
+pub use analyses::{ANALYSES, Job};
 pub use compile::compile;
 pub use explain::{Failure, FailureKind};
+pub use linearise::Linear;
 pub use methods::{METHODS, Method};
-pub use settings::{Interval, OPTIONS, OptionRow, Settings, Tolerance};
+pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Tolerance};
 pub use statistics::{Rejected, Statistics};
 pub use step::{OperatingPoint, operating_point, transient};
 pub use system::System;

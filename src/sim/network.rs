@@ -3,7 +3,7 @@
 //! All buffers are made once; nothing here allocates while a run steps.
 
 use super::events::Track;
-use super::laws::Registers;
+use super::laws::{LawSet, Registers};
 use super::memory::Memories;
 use super::reduce::null_vector;
 use super::statistics::Statistics;
@@ -537,6 +537,82 @@ impl<'a> Network<'a> {
         self.system.output_laws.values(&self.inputs, &mut self.output_registers, out);
     }
 
+    /// G + f' and A·(C + q') as triplets, with the derivatives of the last linearisation.
+    pub fn matrices(&self) -> (Triplets, Triplets) {
+        let system = self.system;
+        let place = |(row, column, value): (usize, usize, f64)| (row as u32, column as u32, value);
+        let mut fixed: Triplets = system.conductances.triplets().map(place).collect();
+        let mut storage: Triplets = vec![];
+        for (k, equation, sign) in system.rates.triplets() {
+            let entries = system.charges.row(k);
+            storage.extend(entries.map(|(column, c)| place((equation, column, sign * c))));
+        }
+        for (state, group) in self.groups.iter().zip(&system.groups) {
+            for (o, target) in group.targets.iter().enumerate() {
+                for p in group.laws.row(o) {
+                    let (column, slope) = (group.laws.input(p), state.partials[p]);
+                    match target {
+                        _ if column >= system.equations() => {}
+                        Target::Equations(into) => fixed.extend(
+                            into.iter().map(|(row, factor)| (*row, column as u32, factor * slope)),
+                        ),
+                        Target::Charge(k) => storage.extend(
+                            system
+                                .rates
+                                .row(*k as usize)
+                                .map(|(row, sign)| place((row, column, sign * slope))),
+                        ),
+                    }
+                }
+            }
+        }
+        (fixed, storage)
+    }
+
+    /// Of each memory the slopes of its input; the system was compiled for linearising.
+    pub fn memory_slopes(&mut self, x: &[f64]) -> Vec<Vec<(u32, f64)>> {
+        self.set_inputs(x, 0.0);
+        let (_, partials) = slopes(&self.system.memory_inputs, &self.inputs);
+        let laws = &self.system.memory_inputs;
+        let row = |o: usize| laws.row(o).map(|p| (laws.input(p) as u32, partials[p])).collect();
+        (0..self.system.memories.len()).map(row).collect()
+    }
+
+    /// Of each output column the slopes by unknowns, and those by rates in terms of unknowns.
+    #[allow(clippy::type_complexity)]
+    pub fn output_slopes(&mut self, x: &[f64]) -> Vec<(Vec<(u32, f64)>, Vec<(u32, f64)>)> {
+        self.set_inputs(x, 0.0);
+        let system = self.system;
+        let laws = &system.output_laws;
+        let (_, partials) = slopes(laws, &self.inputs);
+        let (n, first) = (system.equations(), system.inputs() - system.charges());
+        let mut found = vec![];
+        for o in 0..system.outputs.len() {
+            let (mut terms, mut rates) = (vec![], vec![]);
+            for p in laws.row(o) {
+                let (input, slope) = (laws.input(p), partials[p]);
+                if input < n {
+                    terms.push((input as u32, slope));
+                } else if input >= first {
+                    rates.extend(self.charge_slopes(input - first).map(|(k, c)| (k, slope * c)));
+                }
+            }
+            found.push((terms, rates));
+        }
+        found
+    }
+
+    /// ∂Q_k/∂x, with the derivatives of the last linearisation.
+    fn charge_slopes(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let linear = self.system.charges.row(k).map(|(column, c)| (column as u32, c));
+        let groups = self.groups.iter().zip(&self.system.groups);
+        let curved = groups.flat_map(move |(state, group)| {
+            let own = group.charge_slopes.iter().filter(move |(_, charge, _)| *charge == k as u32);
+            own.map(|(partial, _, unknown)| (*unknown, state.partials[*partial as usize]))
+        });
+        linear.chain(curved)
+    }
+
     /// The first law whose value or derivative is no finite number.
     pub fn non_finite_law(&self) -> Option<crate::circuit::DeviceId> {
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
@@ -549,6 +625,17 @@ impl<'a> Network<'a> {
         }
         None
     }
+}
+
+/// Entries of a matrix: (row, column, value).
+pub(crate) type Triplets = Vec<(u32, u32, f64)>;
+
+/// Values and slopes of laws.
+fn slopes(laws: &LawSet, inputs: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut values = vec![0.0; laws.len()];
+    let mut partials = vec![0.0; laws.partials()];
+    laws.full(inputs, &mut laws.registers(), &mut values, &mut partials);
+    (values, partials)
 }
 
 fn device_of(group: &LawGroup, o: usize) -> Option<crate::circuit::DeviceId> {

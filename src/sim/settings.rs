@@ -107,7 +107,7 @@ impl Settings {
             Analysis::Transient { step, stop, start, hmax, uic } => {
                 Some(Settings { start, step, hmax, uic, ..Settings::new(stop) })
             }
-            Analysis::OperatingPoint => None,
+            _ => None,
         });
         let Some(mut settings) = transient else {
             d.push(

@@ -92,6 +92,27 @@ impl Statistics {
         self.solves += other.solves;
         self.iterations += other.iterations;
     }
+
+    /// Adds another run to this one: of the steps of a sweep.
+    pub fn add(&mut self, other: &Statistics) {
+        self.add_work(other);
+        self.accepted += other.accepted;
+        self.rejected.error += other.rejected.error;
+        self.rejected.newton += other.rejected.newton;
+        self.rejected.singular += other.rejected.singular;
+        self.rejected.non_finite += other.rejected.non_finite;
+        self.rejected.event += other.rejected.event;
+        self.events += other.events;
+        self.slides += other.slides;
+        self.corners += other.corners;
+        self.rows += other.rows;
+        self.pilot += other.pilot;
+        for warning in &other.warnings {
+            if !self.warnings.contains(warning) {
+                self.warnings.push(warning.clone());
+            }
+        }
+    }
 }
 
 impl fmt::Display for Statistics {

@@ -1,7 +1,7 @@
 //! A transient run: steps of controlled error from corner to corner, restarts, events, rows.
 
 mod crossing;
-mod past;
+pub(super) mod past;
 mod restart;
 mod rows;
 mod trouble;
@@ -19,6 +19,7 @@ use super::output::{Inside, Rows};
 use super::settings::{Settings, Tolerance};
 use super::statistics::Statistics;
 use super::system::System;
+use crate::circuit::Waveform;
 use crate::trace::Sink;
 
 /// Values of an operating point.
@@ -38,6 +39,7 @@ pub struct OperatingPoint {
 /// When there is none, or it was not found.
 pub fn operating_point(system: &System) -> Result<OperatingPoint, Failure> {
     let mut network = Network::new(system, 0.0, 0.0);
+    set_to_dc(&mut network);
     count_system(&mut network, "newton", "operating point");
     let floors = op::floors(&network);
     let mut work = Work::new(system.equations(), system.charges());
@@ -90,6 +92,15 @@ pub fn transient(
     }
     run.run()?;
     Ok(run.network.statistics)
+}
+
+/// Gives sources their DC values, where they have one beside what they are over time.
+pub(super) fn set_to_dc(network: &mut Network) {
+    for (segment, source) in network.segments.iter_mut().zip(&network.system.sources) {
+        if let Some(value) = source.parts.dc {
+            *segment = Waveform::Constant(value).segment(0.0);
+        }
+    }
 }
 
 fn count_system(network: &mut Network, method: &str, reason: &str) {

@@ -14,7 +14,7 @@ use super::clocks::Clock;
 use super::laws::LawSet;
 use super::memory::MemoryData;
 use crate::circuit::stamps::{DeviceLabel, Junction, Unknown};
-use crate::circuit::{DeviceId, Waveform};
+use crate::circuit::{DeviceId, Parts, Waveform};
 use crate::linear::Pattern;
 use crate::source::Span;
 use std::fmt;
@@ -139,7 +139,10 @@ pub(crate) struct LawGroup {
 /// An independent source.
 #[derive(Clone, Debug)]
 pub(crate) struct Source {
+    pub device: DeviceId,
     pub waveform: Waveform,
+    /// What it is outside a run over time.
+    pub parts: Parts,
     pub into: Vec<(u32, f64)>,
 }
 

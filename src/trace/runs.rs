@@ -80,7 +80,7 @@ mod tests {
         let mut trace = Trace::new(vec!["time".into(), "x".into()], vec!["s".into()]);
         trace.columns =
             vec![vec![0.0, 1.0, 1.0, 2.0, 0.0, 2.0, 0.0], (0..7).map(f64::from).collect()];
-        assert_eq!(trace.runs(), [0..7]);
+        assert_eq!(trace.runs(), vec![0..7]);
         trace.count_runs();
         assert_eq!(trace.names, ["step", "time", "x"]);
         assert_eq!(trace.columns[0], [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0]);

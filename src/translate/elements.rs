@@ -1,12 +1,13 @@
 //! Cards of elements, island by island.
 
-use super::Builder;
-use super::flows::{Carrier, own_device};
+use super::flows::{Carrier, Reader, own_device};
 use super::forms::{Coupling, Form, Integrator, SourceValue, constant_value, form_at};
+use super::islands::is_junction;
 use super::map::Link;
-use super::names::Namer;
+use super::names::{Namer, common_part};
 use super::series_parallel::Item;
 use super::values::{Speaker, Unreadable, negate, product, signed, tidy};
+use super::{Builder, Mark};
 use crate::bond::graph::{
     self, BondGraph, BondId, End, Initial, Law, Leaf, StoreInitial, StoreLaw, Variable, VertexId,
 };
@@ -66,8 +67,10 @@ impl Builder<'_> {
                 continue;
             }
             let heading = self.heading(index);
+            self.mark(Mark::default());
             self.comment(heading);
             for item in items {
+                self.mark(self.mark_of(item));
                 match item {
                     Item::Port(end) => {
                         if let Err(unreadable) = self.port_card(end) {
@@ -77,6 +80,38 @@ impl Builder<'_> {
                     Item::Sense { bond, plus, minus } => self.sense_card(bond, [plus, minus]),
                     Item::Coupler(bond) => self.coupler_cards(bond),
                 }
+            }
+        }
+    }
+
+    /// Which part of the graph an item stands for.
+    fn mark_of(&self, item: Item) -> Mark {
+        let vertex = |bond: BondId| {
+            let bond = self.graph.bond(bond);
+            let ends = [bond.from.vertex, bond.to.vertex];
+            let series = ends.into_iter().find(|v| matches!(self.graph.vertex(*v).law, Law::One));
+            let element = ends.into_iter().find(|v| !is_junction(self.graph, *v));
+            series.or(element).unwrap_or(ends[0])
+        };
+        match item {
+            Item::Port(end) => {
+                Mark { home: self.homes[end.vertex.index()], order: (0, end.vertex.0, end.port) }
+            }
+            Item::Sense { bond, .. } => {
+                let vertex = vertex(bond);
+                Mark { home: self.homes[vertex.index()], order: (0, vertex.0, u32::MAX) }
+            }
+            Item::Coupler(bond) => {
+                let bond = self.graph.bond(bond);
+                let [mut a, mut b] =
+                    [bond.from.vertex, bond.to.vertex].map(|v| self.homes[v.index()]);
+                // The instance around both: those within others stand behind them.
+                while a != b {
+                    let deeper = if a > b { &mut a } else { &mut b };
+                    let around = self.graph.tree.get(*deeper as usize);
+                    *deeper = around.and_then(|instance| instance.parent).unwrap_or(0);
+                }
+                Mark { home: a, order: (0, bond.from.vertex.0, u32::MAX - 1) }
             }
         }
     }
@@ -127,8 +162,14 @@ impl Builder<'_> {
             self.graph.vertex(self.graph.bond(bond).from.vertex).name,
             self.graph.vertex(self.graph.bond(bond).to.vertex).name
         );
-        let effort = self.namer.device('E', &name);
-        let flow = self.namer.device('F', &name);
+        // It stands in the instance around both ends.
+        let around = common_part(
+            &self.graph.vertex(self.graph.bond(bond).from.vertex).name,
+            &self.graph.vertex(self.graph.bond(bond).to.vertex).name,
+        );
+        let full = format!("{around}{}", name.replace(around, ""));
+        let effort = self.namer.device_of('E', &name, full.clone());
+        let flow = self.namer.device_of('F', &name, full);
         let one = || Expr::number(1.0);
         self.device(effort, to, Element::Vcvs { gain: one(), control: from }, span, &what);
         // The current of E runs into the head's +, against the half arrow.
@@ -149,8 +190,9 @@ impl Builder<'_> {
             return Ok(());
         };
         let form = form_at(&self.forms, end).clone();
-        let except = own_device(&form);
-        let law = |builder: &Self, law| builder.value(law, Some(id), Speaker::Card { except });
+        let home = self.homes[id.index()];
+        let reader = Reader { except: own_device(&form), home };
+        let law = |builder: &Self, law| builder.value(law, Some(id), Speaker::Card(reader));
         let from_here = graph.bond(bond).from == end;
         let first = self.cards.len();
         match &form {
@@ -286,7 +328,8 @@ impl Builder<'_> {
             Form::GyratorEfforts { devices, modulus, modulated } => {
                 // e1 = r·f2 with f2 out of port 2, e2 = r·f1 with f1 into port 1.
                 let Some(far) = vertex.bonds.get(1 - port).copied() else { return Ok(()) };
-                let speaker = Speaker::Card { except: modulated.then_some(devices[port]) };
+                let reader = Reader { except: modulated.then_some(devices[port]), home };
+                let speaker = Speaker::Card(reader);
                 let modulus = self.value(modulus, Some(id), speaker)?;
                 let outward = graph.sign_into(far, id, 1 - end.port) < 0.0;
                 let what = format!("{what}.{}", port + 1);
@@ -296,7 +339,7 @@ impl Builder<'_> {
                     let law = tidy(signed(product(modulus, flow), port == 0));
                     Element::BehaviouralVoltage { law }
                 } else {
-                    let Some(carrier) = self.flows.carrier(far, None) else { return Ok(()) };
+                    let Some(carrier) = self.flows.carrier(far, reader) else { return Ok(()) };
                     let negative = carrier.negated ^ outward ^ (port == 0);
                     let gain = if negative { negate(modulus) } else { modulus };
                     Element::Ccvs { gain, control: carrier.device }
@@ -330,6 +373,7 @@ impl Builder<'_> {
             let Form::Field { couplings, .. } = &self.forms[id.index()] else { continue };
             let couplings = couplings.clone();
             let vertex = self.graph.vertex(id);
+            self.mark(Mark { home: self.homes[id.index()], order: (0, id.0, u32::MAX) });
             if !couplings.is_empty() {
                 self.comment(format!(" {}", vertex.name));
             }

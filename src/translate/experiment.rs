@@ -1,11 +1,12 @@
 //! What is to be computed: parameters, options, saved variables, the transient, and the header that other simulators
 //! skip.
 
-use super::Builder;
 use super::values::Speaker;
+use super::{Builder, Mark};
 use crate::bond::graph::{Expr as GraphExpr, Leaf, ParameterId};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Function, Node, Unary};
+use crate::netlist::analysis::Print;
 use crate::netlist::header::{Column, DomainVariables, Header};
 use crate::netlist::write::expression;
 use crate::netlist::{self, Card, CardKind, Element, Expr, Name};
@@ -74,6 +75,7 @@ impl Builder<'_> {
 
     /// Adds options, saved variables and the transient, and returns the header.
     pub(super) fn experiment_cards(&mut self, diagnostics: &mut Vec<Diagnostic>) -> Header {
+        self.mark(Mark::default());
         let experiment = &self.graph.experiment;
         let mut columns = Vec::new();
         let mut saved = Vec::new();
@@ -105,8 +107,8 @@ impl Builder<'_> {
         ));
         if !saved.is_empty() {
             // `.print` makes a run without a raw file worth having (`… | ngspice -b`), `.save` keeps a raw file small.
-            push(CardKind::Save { print: false, items: saved.clone() });
-            push(CardKind::Save { print: true, items: saved });
+            push(CardKind::Save { of: Print::Any, items: saved.clone() });
+            push(CardKind::Save { of: Print::Transient, items: saved });
         }
         if let (Some(until), Some(step)) = (experiment.until, experiment.step) {
             let number = |value: f64| Expr::number(value);
@@ -234,7 +236,7 @@ impl Builder<'_> {
 }
 
 /// Whether ngspice computes an expression in a `.param` as we do: sums, products, fractions and the plainest functions.
-fn portable(expr: &GraphExpr) -> bool {
+pub(super) fn portable(expr: &GraphExpr) -> bool {
     match &*expr.node {
         Node::Number(value) => value.is_finite(),
         Node::Leaf(_) => true,

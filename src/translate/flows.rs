@@ -17,6 +17,15 @@ pub struct Carrier {
     pub negated: bool,
 }
 
+/// Who asks for a carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reader {
+    /// The device whose law it is, which cannot name its own current.
+    pub except: Option<Name>,
+    /// The instance that its card stands in, an index into [`BondGraph::tree`].
+    pub home: u32,
+}
+
 /// How a flow is known without a source that carries it. Signs are the reader's business.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Origin {
@@ -47,12 +56,22 @@ pub struct Sense {
     pub device: Name,
 }
 
+/// A carrier, how well it reads (lower is better), and the instance that it stands in.
+#[derive(Clone, Copy)]
+struct Candidate {
+    rank: u32,
+    carrier: Carrier,
+    home: u32,
+}
+
 /// The flows of a graph.
 pub struct Flows {
     /// Bonds of equal flow, up to sign.
     classes: Forest,
     /// By the head of a class, best first: how its flow counts against the head's, and the device.
-    carriers: Vec<Vec<(u32, Carrier)>>,
+    carriers: Vec<Vec<Candidate>>,
+    /// By bond: the instances that its ends stand in.
+    homes: Vec<[u32; 2]>,
     /// By the head of a class: a linear dissipator of that flow, and its bond.
     ohms: Vec<Option<(VertexId, BondId)>>,
     /// By the head of a class: the best way to know its flow, and the bond that this way speaks of.
@@ -64,7 +83,10 @@ pub struct Flows {
 impl Flows {
     /// Finds the flows that are carried, and adds sources for those that something needs and nothing carries.
     pub fn plan(graph: &BondGraph, forms: &[Form], namer: &mut Namer) -> Flows {
+        let homes = graph.homes();
+        let home = |vertex: VertexId| homes.of(&graph.vertex(vertex).name);
         let mut flows = Flows {
+            homes: graph.bonds.iter().map(|b| [b.from, b.to].map(|end| home(end.vertex))).collect(),
             classes: classes(graph),
             carriers: vec![Vec::new(); graph.bonds.len()],
             ohms: vec![None; graph.bonds.len()],
@@ -81,12 +103,14 @@ impl Flows {
             for (port, rank, device, negated) in carriers(form) {
                 if let Some(bond) = graph.vertex(vertex).bonds.get(port) {
                     let outward = graph.sign_into(*bond, vertex, port as u32) < 0.0;
-                    flows.add_carrier(*bond, rank, Carrier { device, negated: negated ^ outward });
+                    let carrier = Carrier { device, negated: negated ^ outward };
+                    flows.add_carrier(*bond, Candidate { rank, carrier, home: home(vertex) });
                 }
             }
         }
         for need in needs(graph, forms) {
-            let met = flows.carrier(need.bond, need.except).is_some()
+            let reader = Reader { except: need.except, home: 0 };
+            let met = flows.carrier(need.bond, reader).is_some()
                 || (!need.hard && flows.ohm(need.bond).is_some());
             if !met {
                 flows.add_sense(graph, need.bond, namer);
@@ -106,10 +130,19 @@ impl Flows {
         flows
     }
 
-    /// The best voltage source that carries a bond's flow, other than `except`.
-    pub fn carrier(&self, bond: BondId, except: Option<Name>) -> Option<Carrier> {
+    /// The best voltage source that carries a bond's flow: one that stands where it is asked for, else where the bond
+    /// does, so that parts of the circuit need not look into each other.
+    pub fn carrier(&self, bond: BondId, reader: Reader) -> Option<Carrier> {
         let (head, flipped) = self.classes.signed(bond.index());
-        let found = self.carriers[head].iter().find(|(_, c)| Some(c.device) != except)?.1;
+        let others = self.carriers[head].iter().filter(|c| Some(c.carrier.device) != reader.except);
+        let near = |c: &&Candidate| {
+            (c.home != reader.home, !self.homes[bond.index()].contains(&c.home), c.rank)
+        };
+        let found = others.min_by_key(near)?;
+        // Rather than look into another part, a law takes its own current for its argument.
+        let own = (found.home != reader.home)
+            .then(|| self.carriers[head].iter().find(|c| Some(c.carrier.device) == reader.except));
+        let found = own.flatten().unwrap_or(found).carrier;
         Some(Carrier { device: found.device, negated: found.negated ^ flipped })
     }
 
@@ -127,11 +160,11 @@ impl Flows {
         Some((of, origin, flipped ^ self.classes.signed(of.index()).1))
     }
 
-    fn add_carrier(&mut self, bond: BondId, rank: u32, carrier: Carrier) {
+    fn add_carrier(&mut self, bond: BondId, candidate: Candidate) {
         let (head, flipped) = self.classes.signed(bond.index());
-        let carrier = Carrier { device: carrier.device, negated: carrier.negated ^ flipped };
-        self.carriers[head].push((rank, carrier));
-        self.carriers[head].sort_by_key(|(rank, _)| *rank);
+        let Carrier { device, negated } = candidate.carrier;
+        let carrier = Carrier { device, negated: negated ^ flipped };
+        self.carriers[head].push(Candidate { carrier, ..candidate });
     }
 
     fn add_sense(&mut self, graph: &BondGraph, bond: BondId, namer: &mut Namer) {
@@ -139,16 +172,24 @@ impl Flows {
         let series = ends.into_iter().find(|v| matches!(graph.vertex(*v).law, Law::One));
         let element = ends.into_iter().find(|v| !is_junction(graph, *v));
         let named = series.or(element).unwrap_or(ends[0]);
-        let device = namer.device('V', &format!("sense_{}", graph.vertex(named).name));
+        let name = &graph.vertex(named).name;
+        let full = match name.rsplit_once('.') {
+            Some((instance, own)) => format!("{instance}.sense_{own}"),
+            None => format!("sense_{name}"),
+        };
+        let device = namer.device_of('V', &format!("sense_{name}"), full);
         self.senses.push(Sense { bond, device });
-        self.add_carrier(bond, 0, Carrier { device, negated: false });
+        let home = self.homes[bond.index()][usize::from(named != ends[0])];
+        let carrier = Carrier { device, negated: false };
+        self.add_carrier(bond, Candidate { rank: 0, carrier, home });
     }
 
     /// Fills `origins`: what elements tell first, then what follows from it.
     fn find_origins(&mut self, graph: &BondGraph, forms: &[Form]) {
         self.origins = vec![None; graph.bonds.len()];
         for bond in graph.bond_ids() {
-            if let Some(carrier) = self.carrier(bond, None) {
+            let own = Reader { except: None, home: self.homes[bond.index()][0] };
+            if let Some(carrier) = self.carrier(bond, own) {
                 self.learn(bond, Origin::Carrier(carrier));
             }
         }
@@ -298,8 +339,9 @@ fn carriers(form: &Form) -> Vec<(usize, u32, Name, bool)> {
         Form::Transformer { lead, effort, modulated, .. } => {
             vec![(*lead, if *modulated { 2 } else { 1 }, *effort, false)]
         }
-        Form::GyratorEfforts { devices, modulated: true, .. } => {
-            vec![(0, 2, devices[0], false), (1, 2, devices[1], false)]
+        Form::GyratorEfforts { devices, modulated, .. } => {
+            let rank = if *modulated { 2 } else { 4 };
+            vec![(0, rank, devices[0], false), (1, rank, devices[1], false)]
         }
         Form::Field { ports, .. } => {
             let at = |port: usize, form: &Form| {
@@ -308,8 +350,7 @@ fn carriers(form: &Form) -> Vec<(usize, u32, Name, bool)> {
             };
             ports.iter().enumerate().flat_map(|(port, form)| at(port, form)).collect()
         }
-        Form::GyratorEfforts { modulated: false, .. }
-        | Form::Junction
+        Form::Junction
         | Form::Open
         | Form::FlowSource { .. }
         | Form::Resistor { .. }

@@ -4,7 +4,7 @@ use super::names::Namer;
 use crate::bond::causality::Causality;
 use crate::bond::graph::{
     BondGraph, Dissipation, End, Expr, Field, Law, Leaf, Modulus, ParameterId, Power, SignalId,
-    SignalLaw, Storage, StoreLaw, Stroke, Variable, VertexId,
+    SignalLaw, SignalOrigin, Storage, StoreLaw, Stroke, Variable, VertexId,
 };
 use crate::expr::{Binary, Function, Node};
 use crate::netlist::Name;
@@ -433,8 +433,15 @@ fn source_value(graph: &BondGraph, uses: &Uses, sets: Power, value: &Expr) -> So
         return SourceValue::Law(value.clone());
     };
     // A waveform that nothing else needs stands in the source. An observed one is then read as the source's voltage,
-    // for which a source of flow has no name.
-    let native = matches!(graph.signals[id.index()].law, SignalLaw::Waveform(_))
+    // for which a source of flow has no name. What an instance is given stands outside it.
+    let outside = {
+        let signal = &graph.signals[id.index()];
+        let around = signal.name.rsplit_once('.').map_or("", |(around, _)| around);
+        let told = graph.tree.get(signal.home as usize);
+        signal.origin == SignalOrigin::Input && told.is_some_and(|teller| teller.name != around)
+    };
+    let native = !outside
+        && matches!(graph.signals[id.index()].law, SignalLaw::Waveform(_))
         && uses.laws[id.index()] == 1
         && (sets == Power::Effort || uses.observed[id.index()] == 0);
     if native { SourceValue::Waveform(*id) } else { SourceValue::Copy(*id) }

@@ -10,7 +10,8 @@
 //!    by wires, by the graph that [`graphic`] finds for the flows of an island (`space`, drawn by `realise`), or by
 //!    1:1 couplers where there is none;
 //! 5. `elements`, `signals`, `experiment`: the cards;
-//! 6. [`map`]: every effort, flow, state and signal in terms of the circuit.
+//! 6. [`map`]: every effort, flow, state and signal in terms of the circuit;
+//! 7. [`hierarchy`]: the same circuit with its instances as subcircuits.
 
 mod names;
 mod forest;
@@ -28,6 +29,7 @@ mod elements;
 mod signals;
 mod experiment;
 pub mod map;
+pub mod hierarchy;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -44,8 +46,9 @@ use crate::source::{SourceMap, Span};
 use flows::Flows;
 use forms::{Form, Integrator, Uses};
 use islands::Island;
-use names::Namer;
+use names::{Namer, Wish};
 use series_parallel::{Drawing, Fit, Pair, Point};
+use std::collections::{HashMap, HashSet};
 
 /// What translation makes of a bond graph.
 #[derive(Clone, Debug)]
@@ -56,6 +59,34 @@ pub struct Translation {
     pub map: Map,
     /// How much circuit it took.
     pub figures: Figures,
+    /// Which card stands for which part of the graph.
+    pub origins: Origins,
+}
+
+/// Where the cards of a translation come from.
+#[derive(Clone, Debug, Default)]
+pub struct Origins {
+    /// By card.
+    pub marks: Vec<Mark>,
+    /// What nodes are called after.
+    pub nodes: HashMap<Name, Wish>,
+    /// What devices are called after.
+    pub devices: HashMap<Name, Wish>,
+    /// By bond: the + and − nodes of its tail and of its head, where it has such.
+    pub pairs: Vec<[Option<[Name; 2]>; 2]>,
+    /// The nodes of junctions and elements; all others are signals'.
+    pub power: HashSet<Name>,
+    /// By signal: its node, where it has one.
+    pub signals: Vec<Option<Name>>,
+}
+
+/// Which part of the graph a card stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mark {
+    /// The instance in whose words it is written: an index into [`BondGraph::tree`].
+    pub home: u32,
+    /// Elements by index and port, then signals: the order of the file, whatever the drawing's.
+    pub order: (u32, u32, u32),
 }
 
 /// Turns a bond graph into a circuit. `None` when there were errors.
@@ -80,7 +111,9 @@ pub fn translate(
     let islands = islands::find(graph);
     let flows = Flows::plan(graph, &forms, &mut namer);
     let drawing = Drawing::draw(graph, &islands, &flows.senses);
+    let homes = graph.homes();
     let mut builder = Builder {
+        homes: graph.vertices.iter().map(|vertex| homes.of(&vertex.name)).collect(),
         graph,
         initial,
         source,
@@ -100,6 +133,8 @@ pub fn translate(
         samples: Vec::new(),
         rounds: Vec::new(),
         couplers: 0,
+        mark: Mark::default(),
+        marks: Vec::new(),
     };
     builder.points = builder.name_points(junctions);
     let before = diagnostics.len();
@@ -115,6 +150,22 @@ pub fn translate(
         return None;
     }
     let figures = map.figures;
+    builder.mark(Mark::default());
+    let ends = graph.bond_ids().map(|bond| builder.drawing.ends[bond.index()]);
+    let pairs = ends.map(|ends| ends.map(|pair| Some(builder.nodes(pair?)))).collect();
+    let power = builder.points.iter().copied().filter(|node| *node != builder.ground()).collect();
+    let place = |place: &signals::Place| match place {
+        signals::Place::Node(node) => Some(*node),
+        signals::Place::Source(_) => None,
+    };
+    let origins = Origins {
+        marks: std::mem::take(&mut builder.marks),
+        nodes: std::mem::take(&mut builder.namer.node_wishes),
+        devices: std::mem::take(&mut builder.namer.device_wishes),
+        pairs,
+        power,
+        signals: builder.signal_places.iter().map(place).collect(),
+    };
     let netlist = Netlist {
         title: format!("{}: the circuit of a bond graph", graph.name),
         names: builder.namer.names,
@@ -122,7 +173,7 @@ pub fn translate(
         cards: builder.cards,
         ..Netlist::default()
     };
-    Some(Translation { netlist, map, figures })
+    Some(Translation { netlist, map, figures, origins })
 }
 
 /// What the steps share.
@@ -131,6 +182,8 @@ struct Builder<'a> {
     initial: &'a InitialState,
     source: &'a SourceMap,
     namer: Namer,
+    /// By vertex: the instance that it stands in.
+    homes: Vec<u32>,
     uses: Uses,
     parameters: Vec<Name>,
     signal_places: Vec<signals::Place>,
@@ -150,6 +203,10 @@ struct Builder<'a> {
     /// By signal: the round in which a memory takes its value.
     rounds: Vec<u32>,
     couplers: usize,
+    /// That of the cards that are being added.
+    mark: Mark,
+    /// By card, as far as the mark has changed.
+    marks: Vec<Mark>,
 }
 
 impl Builder<'_> {
@@ -204,6 +261,12 @@ impl Builder<'_> {
                 );
             }
         }
+    }
+
+    /// Which part of the graph the cards from here on stand for.
+    fn mark(&mut self, mark: Mark) {
+        self.marks.resize(self.cards.len(), self.mark);
+        self.mark = mark;
     }
 
     /// The names of a pair's nodes.

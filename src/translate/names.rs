@@ -2,7 +2,7 @@
 //! reserved. What had to be renamed is remembered for the map.
 
 use crate::netlist::{Name, Names};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Words that mean something else than a parameter within expressions (each tried in ngspice, or known of another
 /// simulator that reads the same text).
@@ -171,6 +171,15 @@ pub struct Renamed {
     pub to: String,
 }
 
+/// What a node or a device is called after in the bond graph, by its full name there: `eha[2].motor.rotor`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wish {
+    /// The full name.
+    pub name: String,
+    /// A device's letter.
+    pub letter: char,
+}
+
 /// Gives out names, each once. Parameters, nodes and devices are three spaces.
 #[derive(Default)]
 pub struct Namer {
@@ -178,6 +187,10 @@ pub struct Namer {
     pub names: Names,
     /// What had to be renamed.
     pub renamed: Vec<Renamed>,
+    /// What nodes are called after.
+    pub node_wishes: HashMap<Name, Wish>,
+    /// What devices are called after.
+    pub device_wishes: HashMap<Name, Wish>,
     parameters: HashSet<String>,
     nodes: HashSet<String>,
     devices: HashSet<String>,
@@ -193,13 +206,17 @@ impl Namer {
     /// A fresh name for a node.
     pub fn node(&mut self, wanted: &str) -> Name {
         let name = fresh(&mut self.nodes, RESERVED_NODES, &ascii(wanted));
-        self.give(wanted, name)
+        let name = self.give(wanted, name);
+        self.node_wishes.insert(name, Wish { name: wanted.to_string(), letter: ' ' });
+        name
     }
 
     /// A fresh name for a node within a series loop, numbered after the loop's junction.
     pub fn inner_node(&mut self, junction: &str) -> Name {
         let name = fresh(&mut self.nodes, RESERVED_NODES, &ascii(junction));
-        self.names.intern(&name)
+        let name = self.names.intern(&name);
+        self.node_wishes.insert(name, Wish { name: junction.to_string(), letter: ' ' });
+        name
     }
 
     /// A fresh name for a device: its letter, `_` and the element's name, unless that begins so already.
@@ -213,6 +230,21 @@ impl Namer {
         if name != full {
             self.renamed.push(Renamed { from: full, to: name.clone() });
         }
+        let name = self.names.intern(&name);
+        self.device_wishes.insert(name, Wish { name: wanted.to_string(), letter });
+        name
+    }
+
+    /// The same for what belongs to a part of the bond graph that its name does not begin with.
+    pub fn device_of(&mut self, letter: char, wanted: &str, full: String) -> Name {
+        let name = self.device(letter, wanted);
+        self.device_wishes.insert(name, Wish { name: full, letter });
+        name
+    }
+
+    /// A fresh name for a subcircuit.
+    pub fn subcircuit(&mut self, wanted: &str) -> Name {
+        let name = fresh(&mut self.nodes, &[], &ascii(wanted));
         self.names.intern(&name)
     }
 
@@ -222,6 +254,12 @@ impl Namer {
         }
         self.names.intern(&name)
     }
+}
+
+/// What the names of two parts have in common of the instances that they stand in, `eha[2].`.
+pub fn common_part<'a>(a: &'a str, b: &str) -> &'a str {
+    let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+    a.get(..same).and_then(|same| same.rfind('.')).map_or("", |dot| &a[..=dot])
 }
 
 /// `wanted`, or with `_2`, `_3` … where it is taken or reserved.

@@ -1,9 +1,10 @@
 //! Signals: nodes whose voltage is the signal, referred to ground.
 
-use super::Builder;
 use super::elements::linked;
+use super::flows::Reader;
 use super::forms::{Form, Integrator, SourceValue, constant_value, is_constant};
 use super::values::{Speaker, Unreadable};
+use super::{Builder, Mark};
 use crate::bond::graph::{
     BondGraph, Expr as GraphExpr, Initial, Leaf, Memory, SignalId, SignalLaw, SignalOrigin,
     VertexId, Waveform,
@@ -59,9 +60,11 @@ impl Builder<'_> {
                 continue;
             }
             if !heading {
+                self.mark(Mark::default());
                 self.comment(" signals");
                 heading = true;
             }
+            self.mark(Mark { home: signal.home, order: (1, index as u32, 0) });
             if let Err(unreadable) = self.signal_card(SignalId(index as u32), node) {
                 diagnostics.push(unreadable.diagnostic(graph));
             }
@@ -78,7 +81,7 @@ impl Builder<'_> {
         };
         let what = format!("{kind}{}", signal.name);
         let nodes = [node, self.ground()];
-        let card = Speaker::Card { except: None };
+        let card = Speaker::Card(Reader { except: None, home: signal.home });
         match &signal.law {
             SignalLaw::Algebraic(expr) if is_constant(expr) => {
                 let device = self.namer.device('V', &signal.name);

@@ -230,7 +230,7 @@ impl Solved {
                 Some(column) => self.values[*column],
                 None => device_current(*name),
             },
-            NetLeaf::Time | NetLeaf::Operator(..) => panic!("time in a linear circuit"),
+            other => panic!("{other:?} in a linear circuit"),
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Expressions of the bond graph as expressions of the circuit.
 
 use super::Builder;
-use super::flows::{Carrier, Origin};
+use super::flows::{Carrier, Origin, Reader};
 use super::forms::{Form, SourceValue, form_at};
 use super::series_parallel::Point;
 use super::signals::Place;
@@ -14,8 +14,8 @@ use crate::source::Span;
 /// Who speaks: what may be named differs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Speaker {
-    /// A card: flows are currents of voltage sources, never of `except`, whose law it is.
-    Card { except: Option<Name> },
+    /// A card: flows are currents of voltage sources.
+    Card(Reader),
     /// An output column: any current that a simulator gives, and laws written out.
     Output,
 }
@@ -264,7 +264,7 @@ impl Builder<'_> {
     /// The flow of a bond along its half arrow.
     pub fn flow(&self, bond: BondId, speaker: Speaker) -> Option<Expr> {
         match speaker {
-            Speaker::Card { except } => match self.flows.carrier(bond, except) {
+            Speaker::Card(reader) => match self.flows.carrier(bond, reader) {
                 Some(carrier) => Some(self.current(carrier)),
                 None => {
                     let (vertex, of, negative) = self.flows.ohm(bond)?;

@@ -1,7 +1,5 @@
-//! The certificate of a translation, as far as it is built: trajectories and energy.
-//!
-//! The bond graph's own equations, integrated without any circuit, are held against the netlist's transient for every
-//! observed variable, and the energy of the run is balanced. What is not built is not in the report.
+//! The certificate of a translation: a netlist's text against the bond graph, exactly, in its laws and in its values; the
+//! netlist's transient against the bond graph's own equations, integrated without any circuit; and the balance of energy.
 
 pub mod exact;
 pub mod values;
@@ -9,6 +7,6 @@ pub mod certificate;
 pub mod report;
 pub mod routes;
 
-pub use certificate::{Certificate, SEED, certify};
-pub use report::{EnergyReport, Exact, Laws, Mismatch, Report, Trajectory, Values};
+pub use certificate::{Certificate, SEED, certify, scaling};
+pub use report::{EnergyReport, Exact, Laws, Mismatch, Report, Times, Trajectory, Values};
 pub use routes::{Settings, circuit_route, judge, verify_netlist};

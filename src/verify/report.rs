@@ -26,10 +26,65 @@ pub struct Report {
     /// Values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values: Option<Values>,
+    /// The scaled bond graph against the unscaled one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scaling: Option<Values>,
     /// Every observed variable on both routes; none where the text alone is found to be wrong.
     pub trajectories: Vec<Trajectory>,
     /// The balance, where there was a run.
     pub energy: Option<EnergyReport>,
+    /// What each part took.
+    #[serde(skip)]
+    pub times: Times,
+}
+
+/// Seconds that each part took on the machine it ran on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Times {
+    /// The parts that look at the text: writing and reading it, exact, laws, values, and scaling.
+    pub text: f64,
+    /// The circuit's run.
+    pub circuit: f64,
+    /// The second route.
+    pub second: f64,
+}
+
+impl Times {
+    /// As one JSON object, with `"schema": 1`, beside counters that are the same on every machine.
+    pub fn to_json(&self, report: &Report) -> serde_json::Value {
+        let exact = report.exact.as_ref();
+        serde_json::json!({
+            "schema": 1,
+            "unknowns": exact.map(|exact| exact.unknowns),
+            "operations": exact.map(|exact| exact.operations),
+            "seconds": self,
+        })
+    }
+
+    /// The same in lines.
+    pub fn text(&self, report: &Report) -> String {
+        let mut text = String::new();
+        let _ = match &report.exact {
+            Some(exact) => writeln!(
+                text,
+                "text             {}, {} unknowns, {} multiplications a draw",
+                seconds(self.text),
+                exact.unknowns,
+                exact.operations
+            ),
+            None => writeln!(text, "text             {}", seconds(self.text)),
+        };
+        if report.energy.is_some() {
+            let _ = writeln!(text, "circuit          {}", seconds(self.circuit));
+            let _ = writeln!(text, "second route     {}", seconds(self.second));
+        }
+        text
+    }
+}
+
+/// A duration for people.
+fn seconds(value: f64) -> String {
+    if value < 1.0 { format!("{:.1} ms", 1e3 * value) } else { format!("{value:.2} s") }
 }
 
 /// Something that differs.
@@ -83,6 +138,8 @@ pub struct Exact {
     pub draws: usize,
     /// Unknowns of both systems.
     pub unknowns: usize,
+    /// Multiplications in the eliminations of both in one draw, the same on every machine.
+    pub operations: usize,
     /// Variables that were compared in each draw.
     pub variables: usize,
     /// That a wrong text passes all draws, at most.
@@ -187,8 +244,10 @@ impl Report {
             exact: None,
             laws: None,
             values: None,
+            scaling: None,
             trajectories: vec![],
             energy: None,
+            times: Times::default(),
         };
         report.with(certificate)
     }
@@ -198,8 +257,15 @@ impl Report {
         if !certificate.holds() {
             self.verdict = "fail";
         }
-        let Certificate { exact, laws, values } = certificate;
+        let Certificate { exact, laws, values, scaling } = certificate;
         (self.exact, self.laws, self.values) = (Some(exact), Some(laws), Some(values));
+        self.scaling = scaling;
+        self
+    }
+
+    /// The same with what each part took.
+    pub fn timed(mut self, times: Times) -> Report {
+        self.times = times;
         self
     }
 
@@ -207,7 +273,8 @@ impl Report {
     pub fn mismatches(&self) -> impl Iterator<Item = &Mismatch> {
         let laws = self.laws.iter().flat_map(|part| &part.mismatches);
         let exact = self.exact.iter().flat_map(|part| &part.mismatches);
-        laws.chain(exact).chain(self.values.iter().flat_map(|part| &part.mismatches))
+        let values = self.values.iter().chain(&self.scaling);
+        laws.chain(exact).chain(values.flat_map(|part| &part.mismatches))
     }
 
     /// The parts that look at the text, a line each, and what they found.
@@ -225,6 +292,13 @@ impl Report {
         let _ =
             writeln!(text, "laws     {}  {} texts of laws and signals", laws.verdict, laws.laws);
         let _ = writeln!(text, "values   {}  {} values", values.verdict, values.compared);
+        if let Some(scaling) = &self.scaling {
+            let _ = writeln!(
+                text,
+                "scaling  {}  {} variables, laws and values of the unscaled bond graph",
+                scaling.verdict, scaling.compared
+            );
+        }
         for mismatch in self.mismatches().take(MOST_LINES) {
             let _ = writeln!(text, "  {}", mismatch.line());
         }

@@ -5,7 +5,7 @@
 //! a trajectory may differ by 1e-5 of its range, a hundred times that and far below what a wrong sign, factor or
 //! connection makes. The energy balance must close to 1e-6 of what the sources deliver and take.
 
-use super::report::{EnergyReport, Report, Trajectory};
+use super::report::{EnergyReport, Report, Times, Trajectory};
 use crate::bond::causality::Causality;
 use crate::bond::graph::BondGraph;
 use crate::circuit::stamps::stamp;
@@ -89,8 +89,9 @@ pub fn judge(
     let passes = energy.holds() && trajectories.iter().all(Trajectory::holds);
     let verdict = if passes { "pass" } else { "fail" };
     let energy = Some(energy);
-    let (exact, laws, values) = (None, None, None);
-    Some(Report { schema: 1, verdict, exact, laws, values, trajectories, energy })
+    let (exact, laws, values, scaling) = (None, None, None, None);
+    let times = Times::default();
+    Some(Report { schema: 1, verdict, exact, laws, values, scaling, trajectories, energy, times })
 }
 
 /// Differences of each column, in parts of its range on the second route.

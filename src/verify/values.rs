@@ -81,12 +81,15 @@ impl Check<'_> {
 
     fn parameters(&mut self) {
         for (k, parameter) in self.graph.parameters.iter().enumerate() {
-            let Some(name) = self.text.parameters.get(k).copied().flatten() else { continue };
-            let value = self.text.flat.scopes.parameter(TOP, name).unwrap_or(f64::NAN);
+            let Some((scope, name)) = self.text.parameters.get(k).copied().flatten() else {
+                continue;
+            };
+            let value = self.text.flat.scopes.parameter(scope, name).unwrap_or(f64::NAN);
             self.compared += 1;
             if !equal(value, parameter.value) {
                 let why = format!("it is {value:e}, not {:e}", parameter.value);
-                self.wrong(&format!(".param {}", self.text.netlist.names.text(name)), why);
+                let path = &self.text.flat.scopes.get(scope).path;
+                self.wrong(&format!(".param {path}{}", self.text.names.text(name)), why);
             }
         }
     }
@@ -367,15 +370,16 @@ impl Check<'_> {
     /// Everything that a column reads is saved and printed.
     fn saved(&mut self) {
         let text = self.text;
-        let mut names = text.netlist.names.clone();
+        let mut names = text.names.clone();
         let mut items: [Vec<netlist::Leaf>; 2] = [vec![], vec![]];
         let mut all = [false; 2];
         for card in &text.netlist.cards {
-            let CardKind::Save { print, items: given } = &card.kind else { continue };
-            all[usize::from(*print)] |= given.is_empty();
+            let CardKind::Save { of, items: given } = &card.kind else { continue };
+            let print = usize::from(*of != netlist::analysis::Print::Any);
+            all[print] |= given.is_empty();
             for (_, expr) in given {
                 if let crate::expr::Node::Leaf(leaf) = &*expr.node {
-                    items[usize::from(*print)].push(leaf.clone());
+                    items[print].push(leaf.clone());
                 }
             }
         }
@@ -390,11 +394,13 @@ impl Check<'_> {
                     std::iter::once(*a).chain(*b).map(|node| netlist::Leaf::Voltage(node, None)),
                 ),
                 netlist::Leaf::Current(_) => wanted.push(leaf.clone()),
-                netlist::Leaf::Parameter(_) | netlist::Leaf::Time | netlist::Leaf::Operator(..) => {
-                }
+                _ => {}
             });
+            let dialect = text.netlist.dialect;
             for leaf in wanted {
-                for (print, card) in [(0, ".save"), (1, ".print")] {
+                // Some simulators save everything, and some print from what they have saved.
+                let asked = [(0, ".save", dialect.save), (1, ".print", dialect.print)];
+                for (print, card, _) in asked.into_iter().filter(|(.., word)| !word.is_empty()) {
                     let ground = matches!(leaf, netlist::Leaf::Voltage(node, None)
                         if names.text(node) == "0");
                     let there = all[print] || ground || items[print].contains(&leaf);
@@ -422,7 +428,16 @@ impl Check<'_> {
             let last: std::collections::BTreeMap<String, String> = options.into_iter().collect();
             last
         };
-        let (theirs, ours) = (gather(self.text.netlist), gather(ours));
+        let (mut theirs, ours) = (gather(self.text.netlist), gather(ours));
+        // What every text of a dialect says for its simulator's sake says nothing of the model.
+        for more in self.text.netlist.dialect.options.1 {
+            let (key, value) = more.split_once('=').unwrap_or((more, "1"));
+            let key = format!(".options {key}");
+            let same = |is: &String| is.parse::<f64>().ok() == value.parse::<f64>().ok();
+            if !ours.contains_key(&key) && theirs.get(&key).is_some_and(same) {
+                theirs.remove(&key);
+            }
+        }
         for key in theirs.keys().chain(ours.keys()).collect::<std::collections::BTreeSet<_>>() {
             self.compared += 1;
             let (is, should) = (theirs.get(key), ours.get(key));

@@ -6,6 +6,7 @@ use bondspice::bond::graph::BondGraph;
 use bondspice::bond::{initial, scale};
 use bondspice::netlist::write::write;
 use bondspice::source::SourceMap;
+use bondspice::translate::hierarchy::{Hierarchy, fold};
 use bondspice::translate::{Translation, translate};
 use std::path::{Path, PathBuf};
 
@@ -14,13 +15,21 @@ use std::path::{Path, PathBuf};
 pub struct Translated {
     pub graph: BondGraph,
     pub causality: Causality,
+    /// The flat circuit.
     pub translation: Translation,
+    /// The same with instances as subcircuits.
+    pub nested: Hierarchy,
 }
 
 #[allow(dead_code)]
 impl Translated {
-    /// The netlist's text.
+    /// The netlist's text, as it is emitted.
     pub fn text(&self) -> String {
+        write(&self.nested.netlist)
+    }
+
+    /// That of the flat circuit.
+    pub fn flat_text(&self) -> String {
         write(&self.translation.netlist)
     }
 }
@@ -70,5 +79,6 @@ pub fn translated(model: &Path, overrides: &Overrides) -> Translated {
     let initial = initial.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
     let translation = translate(&graph, &causality, &initial, &map, &mut d);
     let translation = translation.unwrap_or_else(|| panic!("{}: {d:#?}", model.display()));
-    Translated { graph, causality, translation }
+    let nested = fold(&graph, &causality, &map, &translation);
+    Translated { graph, causality, translation, nested }
 }

@@ -453,6 +453,7 @@ fn loops_through_signals() {
         origin: SignalOrigin::Signal,
         span: Span::NONE,
         unit: None,
+        home: 0,
     };
     let reading = Leaf::Bond { bond, variable: Power::Effort, negated: false };
     graph.signals.push(signal("s", SignalLaw::Algebraic(Expr::leaf(reading.clone()))));

@@ -775,6 +775,7 @@ impl<'a> Scope<'a> {
             origin,
             span: name.span,
             unit: None,
+            home: valued.map_or(self.here, |valued| valued.here).frame.0,
         });
         self.signals.push(valued);
         self.signal_order.push((self.clock, usize::MAX));

@@ -30,6 +30,7 @@ mod clashes;
 mod checks;
 mod experiment;
 mod observe;
+mod instances;
 
 #[cfg(test)]
 mod tests;
@@ -127,6 +128,7 @@ pub fn elaborate(
     scope.make_laws(d);
     scope.make_signals(&overrides.drive, d);
     scope.set_observed(overrides.observe.as_deref(), d);
+    scope.remember_instances();
     if !has_errors(&d[before..]) {
         crate::bond::fields::check(&scope.graph, d);
         if overrides.observe.is_none() && program.observes() {

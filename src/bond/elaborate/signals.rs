@@ -71,6 +71,7 @@ impl Scope<'_> {
             origin: SignalOrigin::Hidden,
             span,
             unit: None,
+            home: self.here.frame.0,
         });
         self.signal_order.push((statement, id.index()));
         id

@@ -567,7 +567,10 @@ impl Equations {
                 *t < until && corners.get(next).is_none_or(|corner| *corner > t + near)
             };
             let echoes = fresh.iter().flat_map(|t| delays.iter().map(move |by| t + by));
-            let echoes: Vec<f64> = echoes.filter(is_new).collect();
+            let mut echoes: Vec<f64> = echoes.filter(is_new).collect();
+            // Two delays in either order, or two equal ones, make one corner: their echoes would double each time.
+            echoes.sort_by(f64::total_cmp);
+            echoes.dedup_by(|later, kept| *later - *kept <= near);
             corners =
                 waveform::merge_corners(corners.into_iter().chain(echoes.clone()).collect(), until);
             fresh = echoes;

@@ -3,8 +3,10 @@
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::sources::Times;
 use super::values::near;
+use super::vary::Variation;
 use crate::circuit::{self, DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::read::number;
 use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
@@ -61,6 +63,16 @@ pub struct Pending<'n> {
 
 /// Expands a netlist.
 pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
+    static NONE: std::sync::LazyLock<Variation> = std::sync::LazyLock::new(Variation::default);
+    expand_with(netlist, &NONE, d)
+}
+
+/// Expands a netlist with other values in some places.
+pub fn expand_with<'n>(
+    netlist: &'n Netlist,
+    variation: &'n Variation,
+    d: &mut Vec<Diagnostic>,
+) -> Flat<'n> {
     let ground = Node { name: "0".into(), nominal: None, span: Span::NONE };
     let mut flat = Flat {
         netlist,
@@ -76,10 +88,21 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
         quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());
-    let mut expander =
-        Expander { flat, ground: netlist.names.find("0"), chain: vec![], full: false };
+    flat.scopes.temperature =
+        variation.temperature.or_else(|| stated_temperature(netlist)).unwrap_or(ROOM);
+    let ground = netlist.names.find("0");
+    let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
-    let (live, given) = expander.choose(TOP, &netlist.cards, &[], d);
+    let varied: Vec<(Name, &Expr)> =
+        variation.parameters.iter().map(|(name, expr)| (*name, expr)).collect();
+    let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], &varied, d);
+    // The last of a name counts.
+    given.extend(varied);
+    for (name, model) in &mut expander.flat.scopes.get_mut(TOP).models {
+        if let Some(changed) = variation.models.get(name) {
+            model.2 = changed;
+        }
+    }
     expander.flat.scopes.get_mut(TOP).written =
         given.iter().map(|(name, expr)| (*name, (TOP, *expr))).collect();
     scope::parameters(&mut expander.flat.scopes, TOP, &given, &netlist.names, d);
@@ -95,8 +118,21 @@ pub fn expand<'n>(netlist: &'n Netlist, d: &mut Vec<Diagnostic>) -> Flat<'n> {
     flat
 }
 
+/// The circuit's temperature in °C, where an option states it. One that cannot be read is told of elsewhere.
+fn stated_temperature(netlist: &Netlist) -> Option<f64> {
+    let numbers = netlist.dialect.reading().numbers;
+    let options = netlist.cards.iter().filter_map(|card| match &card.kind {
+        CardKind::Options(options) => Some(options),
+        _ => None,
+    });
+    let texts = options.flatten().filter(|(key, _)| key == "temp");
+    let values = texts.filter_map(|(_, text)| number::number(text, numbers));
+    values.map(|read| read.value).reduce(|_, last| last)
+}
+
 struct Expander<'n> {
     flat: Flat<'n>,
+    variation: &'n Variation,
     ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
@@ -120,7 +156,7 @@ fn globals(found: &mut Table<()>, cards: &[Card]) {
     }
 }
 
-fn parameters_of<'n>(card: &'n Card) -> impl Iterator<Item = (Name, &'n Expr)> {
+fn parameters_of(card: &Card) -> impl Iterator<Item = (Name, &Expr)> {
     let parameters = match &card.kind {
         CardKind::Parameters(parameters) => parameters.as_slice(),
         _ => &[],
@@ -180,6 +216,7 @@ impl<'n> Expander<'n> {
         id: ScopeId,
         cards: &'n [Card],
         outer: &[(Name, &'a Expr)],
+        varied: &[(Name, &'a Expr)],
         d: &mut Vec<Diagnostic>,
     ) -> (Vec<&'n Card>, Given<'a>)
     where
@@ -196,6 +233,7 @@ impl<'n> Expander<'n> {
                     .iter()
                     .copied()
                     .chain(live.iter().flat_map(|card| parameters_of(card)))
+                    .chain(varied.iter().copied())
                     .collect();
                 self.flat.scopes.get_mut(id).parameters.clear();
                 // What is unknown as yet may stand in a branch; what stays unknown is said at the end.
@@ -239,6 +277,9 @@ impl<'n> Expander<'n> {
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
                 | CardKind::Measure(_)
+                | CardKind::Analysis(_)
+                | CardKind::Step(_)
+                | CardKind::Data(_)
                     if id != TOP =>
                 {
                     let message = "this card belongs outside `.subckt`";
@@ -275,6 +316,14 @@ impl<'n> Expander<'n> {
         if self.full {
             return;
         }
+        let device = match self.variation.devices.is_empty() {
+            true => device,
+            false => {
+                let own = self.flat.netlist.names.text(device.name);
+                let path = format!("{}{own}", self.flat.scopes.get(id).path).to_lowercase();
+                self.variation.devices.get(&path).unwrap_or(device)
+            }
+        };
         let nodes: Vec<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;
@@ -415,7 +464,7 @@ impl<'n> Expander<'n> {
             .chain(&values)
             .map(|(name, expr)| (*name, expr))
             .collect();
-        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, d);
+        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, &[], d);
         let own = live.iter().flat_map(|card| parameters_of(card));
         let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
             .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))

@@ -4,13 +4,14 @@ use super::expand::Flat;
 use super::kinds;
 use super::scope::{self, TOP};
 use super::values::Lookup;
-use crate::circuit::{Analysis, Circuit, NodeId, Output};
+use crate::circuit::{self, Analysis, Circuit, NodeId, Output};
 use crate::diagnostic::{Diagnostic, Severity};
+use crate::netlist::analysis::Print;
 use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
 use crate::netlist::read::number;
-use crate::netlist::{CardKind, Expr, Name};
+use crate::netlist::{CardKind, Expr, Leaf, Name};
 use crate::source::{FileId, Span};
 use std::collections::{HashMap, HashSet};
 
@@ -47,6 +48,9 @@ pub fn settings(
                     analyses.push(Analysis::Transient { step, stop, start, hmax, uic: *uic });
                 }
             }
+            CardKind::Analysis(wanted) => {
+                analyses.extend(super::analyses::analysis(flat, wanted, card.span, d));
+            }
             _ => {}
         }
     }
@@ -81,6 +85,7 @@ pub fn temperatures(flat: &mut Flat, options: &[(String, String)], d: &mut Vec<D
 pub fn readings(
     flat: &Flat,
     header: &Header,
+    last: Option<&Analysis>,
     d: &mut Vec<Diagnostic>,
 ) -> (Vec<Output>, Vec<(NodeId, f64)>) {
     let lookup = Lookup::new(flat, &flat.netlist.names);
@@ -90,18 +95,31 @@ pub fn readings(
         columns(flat, header, &mut outputs, d);
         return (outputs, initial);
     }
+    let prints = || {
+        flat.live.iter().filter_map(|card| match &card.kind {
+            CardKind::Save { of, .. } => Some(*of),
+            _ => None,
+        })
+    };
+    // The items of the analysis that is run; where none are, those of any other.
+    let own = last.map(print_of);
+    let said = prints().any(|of| of == Print::Any || Some(of) == own);
+    let wanted = |of: Print| !said || of == Print::Any || Some(of) == own;
     let mut seen = HashSet::new();
     for card in &flat.live {
-        let CardKind::Save { items, .. } = &card.kind else { continue };
+        let CardKind::Save { of, items } = &card.kind else { continue };
+        if !wanted(*of) {
+            continue;
+        }
         if items.is_empty() {
             // `.save all`
             return (vec![], initial);
         }
         for (text, expr) in items {
-            if seen.insert(text.to_lowercase())
-                && let Some(expr) = lookup.law(TOP, expr, d)
+            if let Some(output) = item(&lookup, text, expr, d)
+                && seen.insert(output.name.to_lowercase())
             {
-                outputs.push(Output { name: text.clone(), expr });
+                outputs.push(output);
             }
         }
     }
@@ -131,6 +149,30 @@ fn voltages(
         found.extend(node.zip(value));
     }
     found
+}
+
+/// An item of `.print` and its like. A bare word is a node, or else a parameter.
+pub fn item(lookup: &Lookup, text: &str, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<Output> {
+    if let crate::expr::Node::Leaf(Leaf::Parameter(name)) = &*expr.node {
+        let parameter = || lookup.flat.scopes.value(TOP, *name, lookup.names).is_some();
+        if lookup.has_node(TOP, *name) || !(text.contains(':') || parameter()) {
+            let node = lookup.node(TOP, *name, expr.span, d)?;
+            let expr = circuit::Expr::leaf(circuit::Leaf::Voltage(node, NodeId(0)));
+            return Some(Output { name: format!("v({text})"), expr });
+        }
+    }
+    Some(Output { name: text.to_string(), expr: lookup.law(TOP, expr, d)? })
+}
+
+/// The `.print` that belongs to an analysis.
+fn print_of(analysis: &Analysis) -> Print {
+    match analysis {
+        Analysis::OperatingPoint => Print::OperatingPoint,
+        Analysis::Transient { .. } => Print::Transient,
+        Analysis::Dc { .. } => Print::Dc,
+        Analysis::Ac { .. } => Print::Ac,
+        Analysis::Transfer { .. } => Print::Transfer,
+    }
 }
 
 /// The columns of the header. Their expressions stand in no text that a message could point at.

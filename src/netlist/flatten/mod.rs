@@ -13,18 +13,30 @@ mod patterns;
 mod sources;
 mod operators;
 mod transfer;
+mod analyses;
 mod experiment;
-mod measures;
 mod guess;
+mod measures;
 mod usage;
+pub mod vary;
 
 use super::{Netlist, header::Header};
 use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::source::Span;
+pub use vary::Variation;
 
 /// The circuit of a netlist; `None` when there were errors.
 pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<Circuit> {
+    flatten_with(netlist, &Variation::default(), diagnostics)
+}
+
+/// The circuit of a netlist with other values in some places.
+pub fn flatten_with(
+    netlist: &Netlist,
+    variation: &Variation,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Circuit> {
     let before = diagnostics.len();
     let (header, strange) = Header::read(&netlist.header);
     for line in strange {
@@ -32,17 +44,25 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         diagnostics.push(Diagnostic::warning("W0730", Span::NONE, message));
     }
     usage::check(netlist, &header, diagnostics);
-    let mut flat = expand::expand(netlist, diagnostics);
+    let mut flat = expand::expand_with(netlist, variation, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
-    let zero_is_jump = flat.zero_is_jump();
+    let steps = analyses::steps(&flat, diagnostics);
+    let picked = variation.analysis.as_deref();
+    let run = analyses
+        .iter()
+        .rev()
+        .find(|analysis| picked.is_none_or(|picked| picked == analysis.name()));
     let mut times = sources::Times::of(&analyses);
-    times.zero_is_jump = zero_is_jump;
+    times.zero_is_jump = flat.zero_is_jump();
     flat.times = times;
     experiment::temperatures(&mut flat, &options, diagnostics);
+    if let Some(temperature) = variation.temperature {
+        flat.temperature = temperature;
+    }
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
     let starts = guess::follow(&devices, flat.nodes.len(), &guesses);
-    let (outputs, initial) = experiment::readings(&flat, &header, diagnostics);
+    let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
     let (measures, watched) = measures::resolve(&flat, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
@@ -54,6 +74,7 @@ pub fn flatten(netlist: &Netlist, diagnostics: &mut Vec<Diagnostic>) -> Option<C
         starts,
         initial_holds: netlist.dialect.reading().initial_holds,
         analyses,
+        steps,
         outputs,
         measures,
         watched,

@@ -46,6 +46,18 @@ impl Lookup<'_, '_> {
             return Some(self.quantity(Quantity::Signal { waveform }, span));
         }
         let law = self.law(id, arguments.first()?, d)?;
+        if operator == Operator::Table {
+            let mut points = vec![];
+            for point in &arguments[1..] {
+                points.push(self.number(id, point, d)?);
+            }
+            let Some(table) = crate::netlist::read::expression::table(&points) else {
+                let message = "`table` takes x and pairs of numbers with rising abscissae";
+                d.push(Diagnostic::error("E0706", span, message));
+                return None;
+            };
+            return Some(circuit::Expr::new(Node::Table(law, table.into()), span));
+        }
         Some(match operator {
             Operator::Derivative => self.quantity(Quantity::Derivative { law }, span),
             Operator::Integral => {
@@ -69,7 +81,7 @@ impl Lookup<'_, '_> {
                 }
             }
             Operator::Transfer => transfer::realise(self, id, law, arguments.get(1)?, span, d)?,
-            Operator::Waveform(_) => return None,
+            Operator::Waveform(_) | Operator::Table => return None,
         })
     }
 

@@ -70,7 +70,12 @@ pub struct Scopes<'n> {
     pub all: Vec<Scope<'n>>,
     /// Nodes that are one in every scope.
     pub globals: Table<()>,
+    /// The temperature of the circuit, in °C.
+    pub temperature: f64,
 }
+
+/// The temperature where nothing is said, in °C.
+pub const NOMINAL: f64 = 27.0;
 
 /// The top of the netlist.
 pub const TOP: ScopeId = ScopeId(0);
@@ -104,6 +109,22 @@ impl<'n> Scopes<'n> {
     pub fn parameter(&self, id: ScopeId, name: Name) -> Option<f64> {
         self.around(id).find_map(|(_, scope)| scope.parameters.get(&name).copied())
     }
+
+    /// The value of a parameter, here or around, or of a constant that needs no `.param`.
+    pub fn value(&self, id: ScopeId, name: Name, names: &Names) -> Option<f64> {
+        self.parameter(id, name).or_else(|| match names.text(name) {
+            text if ["temper", "temp"].iter().any(|own| text.eq_ignore_ascii_case(own)) => {
+                Some(self.temperature)
+            }
+            text if text.eq_ignore_ascii_case("vt") => Some(thermal_voltage(self.temperature)),
+            text => constant(text),
+        })
+    }
+}
+
+/// kT/q in V at a temperature in °C, with the constants of SPICE.
+pub fn thermal_voltage(celsius: f64) -> f64 {
+    1.380_622_6e-23 / 1.602_191_8e-19 * (celsius + 273.15)
 }
 
 /// Whether an expression changes during the run: it speaks of time, a voltage or a current, itself or through a parameter.
@@ -122,7 +143,7 @@ pub fn varies(scopes: &Scopes, id: ScopeId, expr: &Expr) -> bool {
 pub fn constant(name: &str) -> Option<f64> {
     match name.to_ascii_lowercase().as_str() {
         "pi" => Some(std::f64::consts::PI),
-        "temper" => Some(27.0),
+        "temper" => Some(NOMINAL),
         _ => None,
     }
 }
@@ -254,8 +275,7 @@ pub fn number(
                 )
             }
             Leaf::Parameter(name) => {
-                let known =
-                    scopes.parameter(id, *name).is_some() || constant(names.text(*name)).is_some();
+                let known = scopes.value(id, *name, names).is_some();
                 (!known).then(|| unknown_parameter(scopes, id, *name, span, names, look))
             }
             _ => Some(
@@ -275,9 +295,7 @@ pub fn number(
         return None;
     }
     Some(expr.evaluate(&mut |leaf| match leaf {
-        Leaf::Parameter(name) => {
-            scopes.parameter(id, *name).or_else(|| constant(names.text(*name))).unwrap_or(f64::NAN)
-        }
+        Leaf::Parameter(name) => scopes.value(id, *name, names).unwrap_or(f64::NAN),
         _ => f64::NAN,
     }))
 }

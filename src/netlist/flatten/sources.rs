@@ -42,7 +42,7 @@ impl Times {
             Analysis::Transient { step, stop, .. } => {
                 Some(Times { step: *step, stop: *stop, ..Times::default() })
             }
-            Analysis::OperatingPoint => None,
+            _ => None,
         });
         transient.unwrap_or_default()
     }

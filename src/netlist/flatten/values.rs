@@ -32,6 +32,7 @@ pub struct Lookup<'f, 'n> {
 }
 
 struct Paths {
+    scopes: HashMap<String, ScopeId>,
     nodes: HashMap<String, NodeId>,
     devices: HashMap<String, DeviceId>,
 }
@@ -46,7 +47,11 @@ impl<'f, 'n> Lookup<'f, 'n> {
         self.paths.get_or_init(|| {
             let nodes = self.flat.nodes.iter().enumerate();
             let devices = self.flat.devices.iter().enumerate();
+            let scopes = self.flat.scopes.all.iter().enumerate();
             Paths {
+                scopes: scopes
+                    .map(|(k, scope)| (scope.path.to_lowercase(), ScopeId(k as u32)))
+                    .collect(),
                 nodes: nodes
                     .map(|(k, node)| (node.name.to_lowercase(), NodeId(k as u32)))
                     .collect(),
@@ -62,6 +67,15 @@ impl<'f, 'n> Lookup<'f, 'n> {
     /// The value of an expression that must be a number.
     pub fn number(&self, id: ScopeId, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<f64> {
         scope::number(&self.flat.scopes, id, expr, self.names, d)
+    }
+
+    /// Where a parameter is to be looked for, and its name there: `x1.x2.r` is that of an instance.
+    pub fn parameter(&self, id: ScopeId, name: Name) -> (ScopeId, Name) {
+        let found = self.names.text(name).rsplit_once('.').and_then(|(path, own)| {
+            let path = format!("{}{path}.", self.flat.scopes.get(id).path).to_lowercase();
+            Some((*self.paths().scopes.get(&path)?, self.names.find(own)?))
+        });
+        found.unwrap_or((id, name))
     }
 
     /// A node by its name in a scope, or by its full one (`x1.out`).
@@ -149,6 +163,46 @@ impl<'f, 'n> Lookup<'f, 'n> {
         None
     }
 
+    /// A value of a device by its key, `r1:r`.
+    fn device_value(&self, id: ScopeId, name: Name, d: &mut Vec<Diagnostic>) -> Option<f64> {
+        let (path, key) = self.names.text(name).rsplit_once(':')?;
+        let path = format!("{}{}", self.flat.scopes.get(id).path, path.replace(':', "."));
+        let device = self.paths().devices.get(&path.to_lowercase())?;
+        let pending = self.flat.devices.get(device.0 as usize)?;
+        let mut element = pending.device.element.clone();
+        let expr = super::vary::value_of(&mut element, Some(key))?;
+        self.number(pending.scope, expr, d)
+    }
+
+    /// Whether a node of this name stands in a scope.
+    pub fn has_node(&self, id: ScopeId, name: Name) -> bool {
+        let text = self.names.text(name);
+        let scope = self.flat.scopes.get(id);
+        let path = || format!("{}{text}", scope.path).to_lowercase();
+        text == "0"
+            || scope.nodes.contains_key(&name)
+            || (text.contains('.') && self.paths().nodes.contains_key(&path()))
+    }
+
+    /// v·i of a device between its first two nodes.
+    fn power(
+        &self,
+        id: ScopeId,
+        name: Name,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Node<circuit::Leaf> {
+        let Some(device) = self.device(id, name, span, d) else { return Node::Number(f64::NAN) };
+        let nodes = self.flat.devices.get(device.0 as usize).map(|pending| &pending.nodes[..]);
+        let Some([a, b, ..]) = nodes else { return Node::Number(f64::NAN) };
+        let leaf = circuit::Expr::leaf;
+        Node::Binary(
+            crate::expr::Binary::Multiply,
+            leaf(circuit::Leaf::Voltage(*a, *b)),
+            leaf(circuit::Leaf::Current(device)),
+        )
+    }
+
     fn is_coupling(&self, device: DeviceId) -> bool {
         let pending = self.flat.devices.get(device.0 as usize);
         pending.is_some_and(|pending| matches!(pending.device.element, Element::Mutual { .. }))
@@ -171,11 +225,12 @@ impl<'f, 'n> Lookup<'f, 'n> {
                     return self.varying(id, *name, d);
                 }
                 Leaf::Parameter(name) => {
+                    let (place, own) = self.parameter(id, *name);
                     let value = self
                         .flat
                         .scopes
-                        .parameter(id, *name)
-                        .or_else(|| scope::constant(self.names.text(*name)));
+                        .value(place, own, self.names)
+                        .or_else(|| self.device_value(id, *name, d));
                     if value.is_none() {
                         let error = scope::unknown_parameter(
                             &self.flat.scopes,
@@ -219,6 +274,25 @@ impl<'f, 'n> Lookup<'f, 'n> {
                 Leaf::Time => Node::Leaf(circuit::Leaf::Time),
                 Leaf::Operator(operator, arguments) => {
                     return self.operator(id, *operator, arguments, span, d);
+                }
+                Leaf::Power(name) => self.power(id, *name, span, d),
+                Leaf::Part(part, inner) => {
+                    let probe = match &**inner {
+                        Leaf::Current(name) => {
+                            self.device(id, *name, span, d).map(circuit::Probe::Current)
+                        }
+                        Leaf::Voltage(plus, minus) => {
+                            let ground = Some(NodeId(0));
+                            let plus = self.node(id, *plus, span, d);
+                            let minus = minus.map_or(ground, |node| self.node(id, node, span, d));
+                            plus.zip(minus).map(|(a, b)| circuit::Probe::Voltage(a, b))
+                        }
+                        _ => None,
+                    };
+                    match probe {
+                        Some(probe) => Node::Leaf(circuit::Leaf::Part(*part, probe)),
+                        None => Node::Number(f64::NAN),
+                    }
                 }
             };
             circuit::Expr::new(node, span)

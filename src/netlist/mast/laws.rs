@@ -64,8 +64,8 @@ impl<'a> Writer<'a> {
             Leaf::Parameter(name) => Formula::leaf(local(this, Local::Parameter(*name))),
             Leaf::Current(name) => Formula::leaf(local(this, Local::Current(*name))),
             Leaf::Time => Formula::leaf("time".to_string()),
-            // Refused by the table of lacks.
-            Leaf::Operator(..) => Formula::number(f64::NAN),
+            // Operators are refused by the table of lacks; powers and parts of phasors stand in outputs alone.
+            Leaf::Operator(..) | Leaf::Power(_) | Leaf::Part(..) => Formula::number(f64::NAN),
             Leaf::Voltage(plus, minus) => {
                 let mut of = |node: Name| match this.name(node) {
                     "0" => None,

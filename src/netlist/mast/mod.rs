@@ -306,7 +306,10 @@ impl<'a> Writer<'a> {
             | CardKind::Save { .. }
             | CardKind::Transient { .. }
             | CardKind::OperatingPoint
-            | CardKind::Measure(_) => {}
+            | CardKind::Measure(_)
+            | CardKind::Analysis(_)
+            | CardKind::Step(_)
+            | CardKind::Data(_) => {}
         }
     }
 

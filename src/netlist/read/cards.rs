@@ -1,9 +1,10 @@
 //! Cards that begin with a dot, but those that hold others (`blocks`) or name files (`pile`).
 
 use super::options::options;
-use super::{Cursor, Reader};
+use super::{Cursor, Reader, analyses};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Node;
+use crate::netlist::analysis::Print;
 use crate::netlist::{CardKind, Definition, Expr, Leaf, Name, Subcircuit};
 use crate::quantity::nearest;
 use crate::source::Span;
@@ -20,7 +21,7 @@ pub enum Treatment {
 
 use Treatment::{Read, Refused, Skipped};
 
-const ANALYSIS: &str = "this analysis is not computed yet";
+const ANALYSIS: &str = "this analysis is not computed";
 const RESULT: &str = "it only asks for a result that is not computed here";
 
 /// Every card but those that the reader itself knows.
@@ -47,20 +48,24 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("print", Read(|reader, cursor| save(reader, cursor, true))),
     ("tran", Read(transient)),
     ("op", Read(|_, _| Some(CardKind::OperatingPoint))),
+    ("dc", Read(analyses::dc)),
+    ("ac", Read(analyses::ac)),
+    ("tf", Read(analyses::transfer)),
+    ("pz", Refused(ANALYSIS)),
+    ("sens", Refused(ANALYSIS)),
+    ("step", Read(analyses::step)),
+    ("data", Read(analyses::data)),
+    ("enddata", Read(|_, _| None)),
     ("plot", Skipped(RESULT)),
     ("probe", Skipped(RESULT)),
     ("four", Skipped(RESULT)),
     ("meas", Read(super::measure::measure)),
     ("measure", Read(super::measure::measure)),
     ("width", Skipped("it lays out another simulator's print")),
-    ("ac", Refused(ANALYSIS)),
-    ("dc", Refused(ANALYSIS)),
-    ("tf", Refused(ANALYSIS)),
-    ("pz", Refused(ANALYSIS)),
-    ("sens", Refused(ANALYSIS)),
     ("noise", Refused(ANALYSIS)),
     ("disto", Refused(ANALYSIS)),
-    ("step", Refused(ANALYSIS)),
+    ("hb", Refused(ANALYSIS)),
+    ("pss", Refused(ANALYSIS)),
     ("csparam", Refused("it belongs to ngspice's command language")),
 ];
 
@@ -384,16 +389,18 @@ const LAYOUT: &[&str] =
 
 /// `.save v(a) i(l1) {expression} node …`; `.print tran …`. No items at all mean everything.
 fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKind> {
+    let mut of = Print::Any;
     if print {
         let (kind, _) = cursor.word();
-        if !matches!(kind.to_lowercase().as_str(), "tran" | "op") {
+        let Some(known) = analyses::print(kind) else {
             let span = cursor.span(reader, 0, cursor.at);
             let warning = Diagnostic::warning("W0703", span, format!("`.print {kind}` is skipped"))
                 .because(ANALYSIS);
             reader.diagnostics.push(warning);
             cursor.at = cursor.text.len();
             return None;
-        }
+        };
+        of = known;
     }
     let (mut items, mut all) = (vec![], false);
     while !cursor.is_done() {
@@ -413,11 +420,11 @@ fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKin
         }
         items.push(item(reader, cursor, from, to)?);
     }
-    Some(CardKind::Save { print, items: if all { vec![] } else { items } })
+    Some(CardKind::Save { of, items: if all { vec![] } else { items } })
 }
 
 /// Items end at blanks outside brackets and braces.
-fn end_of_item(cursor: &Cursor) -> usize {
+pub fn end_of_item(cursor: &Cursor) -> usize {
     let mut depth = 0i32;
     for (at, byte) in cursor.text.bytes().enumerate().skip(cursor.at) {
         match byte {
@@ -431,7 +438,7 @@ fn end_of_item(cursor: &Cursor) -> usize {
 }
 
 /// One item: how it is written, and what it means. `node` is v(node), `v1#branch` is i(v1), `@r1[i]` is i(r1).
-pub(super) fn item(
+pub fn item(
     reader: &mut Reader,
     cursor: &mut Cursor,
     from: usize,
@@ -450,9 +457,21 @@ pub(super) fn item(
     if text.starts_with(|c: char| c.is_alphanumeric() || c == '_')
         && !text.contains(['(', ')', '{', '*', '/', ','])
     {
-        let leaf = Leaf::Voltage(reader.node_name(text), None);
-        return Some((format!("v({text})"), Expr::new(Node::Leaf(leaf), span)));
+        // A node, or a parameter: that is known when all nodes are.
+        let leaf = Leaf::Parameter(reader.names.intern(text));
+        return Some((text.to_string(), Expr::new(Node::Leaf(leaf), span)));
     }
+    if let Some(leaf) = analyses::reading(reader, text) {
+        let name = text.split_whitespace().collect::<String>();
+        return Some((name, Expr::new(Node::Leaf(leaf), span)));
+    }
+    // ngspice: par('expression').
+    let quoted = text.get(..5).filter(|head| head.eq_ignore_ascii_case("par('"));
+    let (from, to) = match quoted {
+        Some(_) if text.ends_with("')") => (from + 5, to - 2),
+        _ => (from, to),
+    };
     let expr = reader.grouped(cursor, from, to)?;
-    Some((text.to_string(), expr))
+    let name = cursor.text[from..to].split_whitespace().collect::<String>();
+    Some((name, expr))
 }

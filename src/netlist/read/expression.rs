@@ -8,7 +8,7 @@ use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{self, Node, Table};
 use crate::netlist::dialects::{Dialect, Reading};
-use crate::netlist::{Expr, Leaf, Names};
+use crate::netlist::{Expr, Leaf, Names, Operator};
 use crate::source::{FileId, Span};
 use pest::Parser;
 use pest::iterators::Pair;
@@ -200,6 +200,26 @@ impl Language for Spice<'_> {
                 let inner = pair.into_inner().next()?;
                 let rule = inner.as_rule();
                 let mut parts = inner.into_inner();
+                if rule == Rule::points {
+                    // `TABLE {x} = (x0, y0) (x1, y1) …`
+                    let mut values = vec![];
+                    for part in parts {
+                        values.push(parse::expression(self, part, d)?);
+                    }
+                    let x = values.remove(0);
+                    let numbers: Option<Vec<f64>> = values.iter().map(|v| v.constant()).collect();
+                    let Some(numbers) = numbers else {
+                        values.insert(0, x);
+                        let leaf = Leaf::Operator(Operator::Table, values);
+                        return Some(Expr::new(Node::Leaf(leaf), span));
+                    };
+                    let Some(table) = table(&numbers) else {
+                        let message = "a table takes pairs of numbers with rising abscissae";
+                        d.push(Diagnostic::error("E0706", span, message));
+                        return None;
+                    };
+                    return Some(Expr::new(Node::Table(x, Arc::new(table)), span));
+                }
                 if rule == Rule::braced || rule == Rule::quoted {
                     return parse::expression(self, parts.next()?, d);
                 }
@@ -242,9 +262,14 @@ impl Language for Spice<'_> {
             let leaf = self.calls.as_mut()?.add(self.names, name, arguments, span);
             return Some(Expr::new(Node::Leaf(leaf), span));
         }
+        // Points that follow from parameters are known when these are.
+        let open = arguments.iter().skip(1).any(|point| point.constant().is_none());
+        if open && folded == "table" && arguments.len() % 2 == 1 && arguments.len() > 2 {
+            return Some(Expr::new(Node::Leaf(Leaf::Operator(Operator::Table, arguments)), span));
+        }
         let mut arguments = arguments.into_iter();
         let x = arguments.next();
-        let points: Option<Vec<f64>> = arguments.map(|point| point.as_number()).collect();
+        let points: Option<Vec<f64>> = arguments.map(|point| point.constant()).collect();
         let table = points.and_then(|points| table(&points));
         match (x, table) {
             (Some(x), Some(table)) => {

@@ -333,7 +333,13 @@ fn window(reader: &mut Reader, cursor: &mut Cursor) -> Option<Window<Expr, Expr>
 /// Calls `visit` for every expression that a measure reads.
 pub fn expressions(kind: &MeasureKind, visit: &mut dyn FnMut(&Expr)) {
     let visit = std::cell::RefCell::new(visit);
-    kind.try_map(&mut |column| Some(visit.borrow_mut()(column)), &mut |value| {
-        Some(visit.borrow_mut()(value))
-    });
+    let mut column = |expr: &Expr| {
+        visit.borrow_mut()(expr);
+        Some(())
+    };
+    let mut value = |expr: &Expr| {
+        visit.borrow_mut()(expr);
+        Some(())
+    };
+    kind.try_map(&mut column, &mut value);
 }

@@ -21,6 +21,7 @@ pub mod passive;
 pub mod linked;
 pub mod devices;
 pub mod cards;
+pub mod analyses;
 pub mod measure;
 
 use crate::diagnostic::Diagnostic;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::expr::Node;
+use crate::netlist::analysis::Print;
 use crate::netlist::{Device, Element, Expr, Leaf, Shape, Source, Waveform};
 use proptest::prelude::*;
 
@@ -191,16 +192,16 @@ fn cards_with_a_dot() {
     let (_, CardKind::Transient { start, uic, .. }) = clean(".tran 1u 20m uic") else { panic!() };
     assert!(start.is_none() && uic);
 
-    let (_, CardKind::Save { print, items }) =
+    let (_, CardKind::Save { of, items }) =
         clean(".save v(x_0) out I(L1) v(a, b) {v(a)*i(r1)} v1#branch @r1[i]")
     else {
         panic!()
     };
     let written: Vec<_> = items.iter().map(|(text, _)| text.as_str()).collect();
-    assert_eq!(written, ["v(x_0)", "v(out)", "I(L1)", "v(a, b)", "{v(a)*i(r1)}", "i(v1)", "i(r1)"]);
-    assert!(!print);
-    let (_, CardKind::Save { print, items }) = clean(".print tran all") else { panic!() };
-    assert!(print && items.is_empty());
+    assert_eq!(written, ["v(x_0)", "out", "I(L1)", "v(a,b)", "{v(a)*i(r1)}", "i(v1)", "i(r1)"]);
+    assert_eq!(of, Print::Any);
+    let (_, CardKind::Save { of, items }) = clean(".print tran all") else { panic!() };
+    assert!(of == Print::Transient && items.is_empty());
     assert!(matches!(clean(".op").1, CardKind::OperatingPoint));
     let (_, CardKind::Comment(text)) = clean("* a comment ") else { panic!() };
     assert_eq!(text, " a comment");

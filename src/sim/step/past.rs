@@ -104,7 +104,7 @@ impl Run<'_> {
 }
 
 /// Seeks operating points with `find` until what memories hold is what they remember.
-pub(super) fn at_rest(
+pub(in crate::sim) fn at_rest(
     network: &mut crate::sim::network::Network,
     state: &mut op::State,
     mut find: impl FnMut(&mut crate::sim::network::Network, &mut op::State) -> Result<(), Trouble>,

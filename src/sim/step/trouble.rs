@@ -102,7 +102,8 @@ impl Run<'_> {
         network.solve_dynamic(&mut work.right);
         let lost = |k: &u32| {
             let k = *k as usize;
-            !(work.right[k].abs() <= GROSS * weights[k])
+            let size = work.right[k].abs();
+            size.is_nan() || size > GROSS * weights[k]
         };
         stored.iter().any(lost)
     }

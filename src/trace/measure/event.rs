@@ -77,8 +77,6 @@ pub(super) struct Segment<'a> {
     pub y1: &'a [f64],
     /// The row before both.
     pub before: Option<(f64, &'a [f64])>,
-    /// Whether it is but the first row.
-    pub first: bool,
 }
 
 impl Segment<'_> {
@@ -164,7 +162,7 @@ impl Search {
             return if inside && self.hit.is_none() { self.found(at) } else { None };
         }
         let done = matches!(self.which, Which::Number(n) if self.count >= n);
-        if done || segment.first && x1 < self.from || x1 < self.from || x0 > self.to {
+        if done || x1 < self.from || x0 > self.to {
             return None;
         }
         let above = segment.y1[self.column] >= self.level;

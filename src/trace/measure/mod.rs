@@ -177,7 +177,6 @@ impl Measures {
             y0: &self.last.values,
             y1: values,
             before: (self.rows > 1).then_some((self.before.x, &self.before.values[..])),
-            first: self.rows == 0,
         };
         for taking in self.taking.iter_mut().flatten() {
             taking.take(&segment);

@@ -1,12 +1,14 @@
 //! One draw: both systems solved, and everything that must be equal compared.
 
-use super::bonds::{Bonds, Place};
+use super::bonds::{Alike, Bonds, Place};
 use super::draw::{Draw, Modular, decimal};
 use super::floats::Sides;
 use super::form::Trouble;
 use super::text::{Text, port_name};
 use super::wires::Wires;
-use crate::bond::graph::{BondGraph, Law, Memory, ParameterId, Power, SignalLaw, SignalOrigin};
+use crate::bond::graph::{
+    BondGraph, BondId, Law, Memory, ParameterId, Power, SignalLaw, SignalOrigin, Storage,
+};
 use crate::circuit::{DeviceKind, Leaf as CircuitLeaf};
 use crate::expr::Node;
 use crate::netlist::dialects::NGSPICE;
@@ -22,6 +24,8 @@ use std::collections::HashMap;
 pub struct Drawn {
     /// Unknowns of the bond graph and of the circuit.
     pub unknowns: [usize; 2],
+    /// Multiplications in the eliminations of both systems.
+    pub operations: usize,
     /// Variables that were compared.
     pub variables: usize,
     /// Laws and signals that were cut and compared.
@@ -61,11 +65,14 @@ impl From<Trouble> for Nothing {
 pub fn draw<F: Modular>(graph: &BondGraph, text: &Text<'_>, draw: Draw) -> Result<Drawn, Nothing> {
     // A parameter that the text does not name is the number that it is.
     let literal: Vec<bool> = text.parameters.iter().map(Option::is_none).collect();
-    let bonds = Bonds::<F>::new(graph, draw, &literal)?;
-    let theirs = bonds.system.solve().map_err(|found| {
-        let (unknowns, of) = bonds.explain(&found);
-        Nothing::Singular { circuit: false, unknowns, of }
-    })?;
+    let mut bonds = Bonds::<F>::new(graph, draw, &literal, Alike::default())?;
+    let (mut theirs, mut operations) = solution(&bonds)?;
+    let alike = bonds.alike(&theirs)?;
+    if !alike.is_empty() {
+        bonds = Bonds::new(graph, draw, &literal, alike)?;
+        let (again, more) = solution(&bonds)?;
+        (theirs, operations) = (again, operations + more);
+    }
     let wires = Wires::new(text, &bonds)?;
     let mut drawn =
         Drawn { unknowns: [bonds.system.unknowns, wires.system.unknowns], ..Drawn::default() };
@@ -73,7 +80,10 @@ pub fn draw<F: Modular>(graph: &BondGraph, text: &Text<'_>, draw: Draw) -> Resul
         drawn.wrong_laws.push(Mismatch::card(text, *device, why));
     }
     let ours = match wires.system.solve() {
-        Ok(ours) => ours,
+        Ok((ours, more)) => {
+            drawn.operations = operations + more;
+            ours
+        }
         // What cannot be read is the better message.
         Err(_) if !drawn.wrong_laws.is_empty() => return Ok(drawn),
         Err(found) => {
@@ -89,6 +99,17 @@ pub fn draw<F: Modular>(graph: &BondGraph, text: &Text<'_>, draw: Draw) -> Resul
     laws(&sides, &cut, &mut drawn)?;
     memories(&sides, &mut drawn)?;
     Ok(drawn)
+}
+
+/// The solution of the bond graph's equations, and the multiplications that it took.
+///
+/// # Errors
+/// What is singular.
+pub fn solution<F: Modular>(bonds: &Bonds<F>) -> Result<(Vec<F>, usize), Nothing> {
+    bonds.system.solve().map_err(|found| {
+        let (unknowns, of) = bonds.explain(&found);
+        Nothing::Singular { circuit: false, unknowns, of }
+    })
 }
 
 /// Parameters that others define.
@@ -122,8 +143,12 @@ fn variables<F: Modular>(
 ) -> Result<(), Nothing> {
     let values = values(sides.bonds, sides.theirs);
     for variable in sides.wires.text.variables.iter().filter(|variable| !variable.observed) {
-        let Some(value) = values.get(&variable.bg).copied() else { continue };
+        let Some((value, factor)) = values.get(&variable.bg).copied() else { continue };
         drawn.variables += 1;
+        if !(variable.factor / factor - 1.0).abs().le(&(4.0 * f64::EPSILON)) {
+            let why = format!("its factor is {:e}, not {factor:e}", variable.factor);
+            drawn.mismatches.push(Mismatch::of(&variable.bg, &why));
+        }
         let expr = match &variable.expr {
             Ok(expr) => expr,
             Err(missing) => {
@@ -157,24 +182,47 @@ fn equals<F: Modular>(
     Ok(false)
 }
 
-/// Every variable of the bond graph by the name that the map gives it.
-fn values<F: Modular>(bonds: &Bonds<F>, solution: &[F]) -> HashMap<String, F> {
+const POWERS: [(char, Power); 2] = [('e', Power::Effort), ('f', Power::Flow)];
+
+/// What makes a power variable of a bond SI, or what is stored of it.
+fn unscaled(graph: &BondGraph, bond: BondId, power: Power) -> f64 {
+    let domain = graph.bond(bond).domain;
+    let scale = graph.scales.iter().find(|scale| scale.domain == domain);
+    match (scale, power) {
+        (None, _) => 1.0,
+        (Some(scale), Power::Effort) => scale.factor,
+        (Some(scale), Power::Flow) => 1.0 / scale.factor,
+    }
+}
+
+/// Every variable of the bond graph by the name that the map gives it, and what makes it SI.
+fn values<F: Modular>(bonds: &Bonds<F>, solution: &[F]) -> HashMap<String, (F, f64)> {
     let graph = bonds.graph;
     let mut values = HashMap::new();
     for id in graph.vertex_ids() {
         let vertex = graph.vertex(id);
         let name = &vertex.name;
         let Some(first) = vertex.bonds.first().copied() else { continue };
-        let mut put = |name: String, form: super::form::Form<F>| {
-            values.insert(name, form.at(solution));
+        let mut put = |name: String, form: super::form::Form<F>, bond, power| {
+            values.insert(name, (form.at(solution), unscaled(graph, bond, power)));
         };
         match &vertex.law {
-            Law::Zero => put(format!("e({name})"), bonds.power(first, Power::Effort)),
-            Law::One => put(format!("f({name})"), bonds.power(first, Power::Flow)),
+            Law::Zero => {
+                put(format!("e({name})"), bonds.power(first, Power::Effort), first, Power::Effort)
+            }
+            Law::One => {
+                put(format!("f({name})"), bonds.power(first, Power::Flow), first, Power::Flow)
+            }
             Law::Transformer(_) | Law::Gyrator(_) => {
                 for (port, bond) in (1..).zip(&vertex.bonds) {
-                    put(format!("e({name}.{port})"), bonds.power(*bond, Power::Effort));
-                    put(format!("f({name}.{port})"), bonds.power(*bond, Power::Flow));
+                    for (letter, power) in POWERS {
+                        put(
+                            format!("{letter}({name}.{port})"),
+                            bonds.power(*bond, power),
+                            *bond,
+                            power,
+                        );
+                    }
                 }
             }
             _ => {
@@ -185,14 +233,18 @@ fn values<F: Modular>(bonds: &Bonds<F>, solution: &[F]) -> HashMap<String, F> {
                         Law::Source { detector: false, .. } => bonds.power(bond, Power::Flow),
                         _ => bonds.at(end, Power::Flow),
                     };
-                    put(format!("e({name})"), bonds.power(bond, Power::Effort));
-                    put(format!("f({name})"), flow);
-                    if graph.storage(end).is_some()
+                    put(
+                        format!("e({name})"),
+                        bonds.power(bond, Power::Effort),
+                        bond,
+                        Power::Effort,
+                    );
+                    put(format!("f({name})"), flow, bond, Power::Flow);
+                    if let Some(kind) = graph.storage(end)
                         && let Ok(stored) = bonds.stored(end)
                     {
-                        let inertia =
-                            graph.storage(end) == Some(crate::bond::graph::Storage::Inertia);
-                        put(format!("{}({name})", if inertia { 'p' } else { 'q' }), stored);
+                        let letter = if kind == Storage::Inertia { 'p' } else { 'q' };
+                        put(format!("{letter}({name})"), stored, bond, kind.integrates());
                     }
                 }
             }
@@ -203,13 +255,15 @@ fn values<F: Modular>(bonds: &Bonds<F>, solution: &[F]) -> HashMap<String, F> {
         let name = graph.bond_name(bond);
         let nth = count.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
         let name = if *nth > 1 { format!("{name} [{nth}]") } else { name };
-        values.insert(format!("e({name})"), bonds.power(bond, Power::Effort).at(solution));
-        values.insert(format!("f({name})"), bonds.power(bond, Power::Flow).at(solution));
+        for (letter, power) in POWERS {
+            let value = bonds.power(bond, power).at(solution);
+            values.insert(format!("{letter}({name})"), (value, unscaled(graph, bond, power)));
+        }
     }
     for (k, signal) in graph.signals.iter().enumerate() {
         if signal.origin != SignalOrigin::Hidden {
             let form = bonds.signal(crate::bond::graph::SignalId(k as u32));
-            values.insert(signal.name.clone(), form.at(solution));
+            values.insert(signal.name.clone(), (form.at(solution), 1.0));
         }
     }
     values
@@ -239,7 +293,7 @@ fn columns<F: Modular>(
             drawn.mismatches.push(Mismatch::of(&name, &why));
         }
         let factor = decimal::<F>(observation.unit.1).unwrap_or(F::ONE);
-        let mut names = text.netlist.names.clone();
+        let mut names = text.names.clone();
         let read = expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
         // Names that are new stand for nothing.
         let mut known = true;
@@ -248,12 +302,12 @@ fn columns<F: Modular>(
             continue;
         };
         read.leaves(&mut |leaf, _| {
-            let there = |name: &crate::netlist::Name| (name.0 as usize) < text.netlist.names.len();
+            let there = |name: &crate::netlist::Name| (name.0 as usize) < text.names.len();
             known &= match leaf {
                 Leaf::Voltage(a, b) => there(a) && b.as_ref().is_none_or(there),
                 Leaf::Parameter(name) | Leaf::Current(name) => there(name),
                 Leaf::Time => true,
-                Leaf::Operator(..) => false,
+                Leaf::Operator(..) | Leaf::Power(_) | Leaf::Part(..) => false,
             };
         });
         let law = match observation.unit.1 {

@@ -130,8 +130,9 @@ impl<F: Modular> Sides<'_, '_, F> {
             self.replaced(text, scope, arguments, &|value| number(value, point, size, moved));
         replaced.evaluate(&mut |leaf| match leaf {
             Leaf::Parameter(name) => {
-                let names = &self.wires.text.netlist.names;
-                let known = self.wires.text.flat.scopes.parameter(scope, *name);
+                let names = &self.wires.text.names;
+                let (place, own) = self.wires.lookup.parameter(scope, *name);
+                let known = self.wires.text.flat.scopes.parameter(place, own);
                 known.or_else(|| scope::constant(names.text(*name))).unwrap_or(f64::NAN)
             }
             leaf => match self.wires.leaf(scope, leaf) {

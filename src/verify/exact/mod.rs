@@ -11,6 +11,7 @@ pub mod text;
 pub mod wires;
 pub mod floats;
 pub mod compare;
+pub mod scaled;
 
 use super::report::{Exact, Laws, Mismatch};
 use crate::bond::graph::BondGraph;
@@ -31,15 +32,30 @@ type OneDraw<'a> = dyn Fn(Draw) -> Result<Drawn, Nothing> + 'a;
 
 /// Proves or refutes a text. Equal seeds give equal draws.
 pub fn prove(graph: &BondGraph, text: &Text<'_>, seed: u64) -> (Exact, Laws) {
-    let fields: [(&OneDraw<'_>, f64); 2] = [
-        (&|draw| compare::draw::<Prime61>(graph, text, draw), Prime61::MODULUS as f64),
-        (&|draw| compare::draw::<Prime62>(graph, text, draw), Prime62::MODULUS as f64),
-    ];
+    draws(
+        &|draw| compare::draw::<Prime61>(graph, text, draw),
+        &|draw| compare::draw::<Prime62>(graph, text, draw),
+        seed,
+    )
+}
+
+/// Proves or refutes that a scaled graph is the unscaled one.
+pub fn prove_scaled(plain: &BondGraph, scaled: &BondGraph, seed: u64) -> (Exact, Laws) {
+    draws(
+        &|draw| scaled::draw::<Prime61>(plain, scaled, draw),
+        &|draw| scaled::draw::<Prime62>(plain, scaled, draw),
+        seed,
+    )
+}
+
+fn draws(first: &OneDraw<'_>, second: &OneDraw<'_>, seed: u64) -> (Exact, Laws) {
+    let fields = [(first, Prime61::MODULUS as f64), (second, Prime62::MODULUS as f64)];
     let mut exact = Exact {
         verdict: "pass",
         seed,
         draws: 0,
         unknowns: 0,
+        operations: 0,
         variables: 0,
         probability: 1.0,
         mismatches: vec![],
@@ -56,6 +72,7 @@ pub fn prove(graph: &BondGraph, text: &Text<'_>, seed: u64) -> (Exact, Laws) {
                     let compared = (drawn.variables + drawn.laws) as f64;
                     exact.draws += 1;
                     exact.unknowns = drawn.unknowns.iter().sum();
+                    exact.operations = drawn.operations;
                     exact.variables = drawn.variables;
                     exact.probability *= (compared * size * DEGREE / modulus).min(1.0);
                     laws.laws = drawn.laws;

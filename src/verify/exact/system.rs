@@ -29,11 +29,11 @@ impl<F: Modular> System<F> {
         self.unknowns as u32 - 1
     }
 
-    /// The solution.
+    /// The solution, and the multiplications of the elimination.
     ///
     /// # Errors
     /// What is singular.
-    pub fn solve(&self) -> Result<Vec<F>, Undetermined> {
+    pub fn solve(&self) -> Result<(Vec<F>, usize), Undetermined> {
         let n = self.unknowns.max(self.rows.len());
         let mut triplets = Vec::with_capacity(4 * n);
         for (row, form) in self.rows.iter().enumerate() {
@@ -51,7 +51,7 @@ impl<F: Modular> System<F> {
         let mut solution: Vec<F> = self.rows.iter().map(|form| -form.constant).collect();
         solution.resize(n, F::ZERO);
         factors.solve(&mut solution, &mut vec![F::ZERO; n]);
-        Ok(solution)
+        Ok((solution, factors.operations()))
     }
 }
 

@@ -5,8 +5,10 @@ use crate::bond::graph::{BondGraph, End, Law, SignalId, SignalLaw, SignalOrigin,
 use crate::circuit::{Circuit, DeviceKind, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::flatten::expand::{Flat, Pending, expand};
+use crate::netlist::flatten::scope::{ScopeId, TOP};
+use crate::netlist::flatten::values::Lookup;
 use crate::netlist::header::Header;
-use crate::netlist::{Element, Expr, Leaf, Name, Netlist, flatten};
+use crate::netlist::{Element, Expr, Leaf, Name, Names, Netlist, flatten};
 use crate::translate::Map;
 use std::collections::HashMap;
 
@@ -14,6 +16,8 @@ use std::collections::HashMap;
 pub struct Text<'n> {
     /// The netlist.
     pub netlist: &'n Netlist,
+    /// Its names, and those that lead into its subcircuits.
+    pub names: Names,
     /// The same flat.
     pub flat: Flat<'n>,
     /// The same in numbers.
@@ -27,9 +31,9 @@ pub struct Text<'n> {
     /// The map in the names of the text; `None` where the text does not have a name.
     pub variables: Vec<Variable>,
     /// By the text of its name: the variable.
-    names: HashMap<String, usize>,
-    /// By parameter of the graph: its name in the text, where it has one.
-    pub parameters: Vec<Option<Name>>,
+    by_name: HashMap<String, usize>,
+    /// By parameter of the graph: where the text has it, and its name there.
+    pub parameters: Vec<Option<(ScopeId, Name)>>,
 }
 
 /// A variable of the map.
@@ -38,6 +42,8 @@ pub struct Variable {
     pub bg: String,
     /// What it is in the text.
     pub expr: Result<Expr, String>,
+    /// Its value in its unit is the expression times this.
+    pub factor: f64,
     /// Whether it is an observed column.
     pub observed: bool,
 }
@@ -68,26 +74,59 @@ impl<'n> Text<'n> {
         // What is wrong has been said.
         let flat = expand(netlist, &mut vec![]);
         let (header, _) = Header::read(&netlist.header);
-        let find = |name: Name| netlist.names.find(names.text(name));
+        // Paths into subcircuits are no names of the text, but lead to some.
+        let mut known = netlist.names.clone();
+        let leaves = map.variables.iter().filter_map(|variable| variable.expr.as_ref());
+        let mut paths: Vec<Name> = map.parameters.iter().map(|(name, _)| *name).collect();
+        leaves.for_each(|expr| {
+            expr.leaves(&mut |leaf, _| match leaf {
+                Leaf::Parameter(name) | Leaf::Current(name) => paths.push(*name),
+                Leaf::Voltage(plus, minus) => paths.extend([*plus].into_iter().chain(*minus)),
+                _ => {}
+            });
+        });
+        for path in paths {
+            if names.text(path).contains('.') {
+                known.intern(names.text(path));
+            }
+        }
+        let lookup = Lookup::new(&flat, &known);
+        let find = |name: Name| known.find(names.text(name));
+        let none = crate::source::Span::NONE;
+        let node = |name: Name| {
+            let found = find(name)?;
+            let path = known.text(found).contains('.');
+            (!path || lookup.node(TOP, found, none, &mut vec![]).is_some()).then_some(found)
+        };
+        let device = |name: Name| {
+            let found = find(name)?;
+            let path = known.text(found).contains('.');
+            (!path || lookup.device(TOP, found, none, &mut vec![]).is_some()).then_some(found)
+        };
         let variables: Vec<Variable> = map
             .variables
             .iter()
             .filter_map(|variable| {
                 let expr = variable.expr.as_ref()?.try_map(&mut |leaf, span| {
-                    let there = |name: Name| find(name).ok_or_else(|| names.text(name).to_string());
+                    let lacks = |name: Name| names.text(name).to_string();
+                    let at = |name: Name| node(name).ok_or_else(|| lacks(name));
                     let leaf = match leaf {
-                        Leaf::Parameter(name) => Leaf::Parameter(there(*name)?),
-                        Leaf::Voltage(plus, minus) => {
-                            Leaf::Voltage(there(*plus)?, minus.map(there).transpose()?)
+                        Leaf::Parameter(name) => {
+                            Leaf::Parameter(find(*name).ok_or_else(|| lacks(*name))?)
                         }
-                        Leaf::Current(name) => Leaf::Current(there(*name)?),
-                        Leaf::Time => Leaf::Time,
+                        Leaf::Voltage(plus, minus) => {
+                            Leaf::Voltage(at(*plus)?, minus.map(at).transpose()?)
+                        }
+                        Leaf::Current(name) => {
+                            Leaf::Current(device(*name).ok_or_else(|| lacks(*name))?)
+                        }
                         Leaf::Operator(..) => return Err("an operator".to_string()),
+                        other => other.clone(),
                     };
                     Ok(Expr::new(crate::expr::Node::Leaf(leaf), span))
                 });
                 let (bg, observed) = (variable.bg.clone(), variable.observed);
-                Some(Variable { bg, expr, observed })
+                Some(Variable { bg, expr, factor: variable.factor, observed })
             })
             .collect();
         let by_name = (0..variables.len()).map(|k| (variables[k].bg.clone(), k)).collect();
@@ -110,10 +149,11 @@ impl<'n> Text<'n> {
             }
             claims.push(place);
         }
-        let written = &flat.scopes.get(crate::netlist::flatten::scope::TOP).written;
-        let parameters = map.parameters.iter().map(|(name, _)| find(*name));
-        let parameters =
-            parameters.map(|name| name.filter(|name| written.contains_key(name))).collect();
+        let parameters = map.parameters.iter().map(|(name, _)| {
+            let (scope, own) = lookup.parameter(TOP, find(*name)?);
+            flat.scopes.get(scope).written.contains_key(&own).then_some((scope, own))
+        });
+        let parameters = parameters.collect();
         Some(Text {
             netlist,
             circuit,
@@ -121,15 +161,16 @@ impl<'n> Text<'n> {
             claims,
             devices,
             variables,
-            names: by_name,
+            by_name,
             parameters,
+            names: known,
             flat,
         })
     }
 
     /// A variable of the map, by what the bond graph calls it.
     pub fn variable(&self, bg: &str) -> Option<&Expr> {
-        self.variables.get(*self.names.get(bg)?)?.expr.as_ref().ok()
+        self.variables.get(*self.by_name.get(bg)?)?.expr.as_ref().ok()
     }
 
     /// `e(name)` of a port as an expression of the text.
@@ -177,10 +218,10 @@ impl<'n> Text<'n> {
             (Law::Rate { .. }, _) => {
                 // One integrator holds the state, another, where somebody asks, what is stored.
                 let counted = self.stored(graph, end).map(|expr| &*expr.node);
-                let node = self.flat.devices.get(device).and_then(|p| p.device.nodes.first());
+                let node = self.circuit.devices.get(device).and_then(|d| d.nodes.first());
                 match (counted, node) {
                     (Some(crate::expr::Node::Leaf(Leaf::Voltage(at, None))), Some(node))
-                        if at == node =>
+                        if self.names.text(*at).eq_ignore_ascii_case(self.node_name(*node)) =>
                     {
                         Start::Stored(end)
                     }

@@ -22,6 +22,7 @@ use crate::bond::graph::{
     Power, SignalId, SignalLaw, Storage, StoreLaw, Variable, VertexId,
 };
 use crate::expr::Binary;
+use crate::quantity::Domain;
 use crate::source::Span;
 use std::collections::HashMap;
 
@@ -62,6 +63,12 @@ pub struct Cut<F> {
     pub own: Option<VertexId>,
 }
 
+/// Signals of signals are followed so far for a value that is known beforehand.
+const DEEPEST_KNOWN: usize = 16;
+/// What the numbers of laws that are cut alike are drawn by.
+const ALIKE_OFFSET: u64 = 0x6f66_6673;
+const ALIKE_SLOPE: u64 = 0x736c_6f70;
+
 /// The equations of a graph.
 pub struct Bonds<'g, F> {
     /// The graph.
@@ -77,13 +84,28 @@ pub struct Bonds<'g, F> {
     /// Laws that are cut.
     pub cuts: HashMap<Place, Cut<F>>,
     /// Moduli that are cut, and what to.
-    moduli: Vec<(Expr, VertexId, F)>,
+    pub moduli: Vec<(Expr, VertexId, F)>,
+    /// What is cut alike.
+    alike: Alike<F>,
     /// By vertex and port: the unknown that it stores.
     stored: HashMap<End, u32>,
     /// By signal: its unknown. Waveforms have one too, so that a product of two is no number on either side.
     signals: Vec<u32>,
     /// s
     pub s: F,
+    /// The domains whose efforts are divided by these factors and whose flows are multiplied, where what is drawn stands
+    /// for the unscaled graph.
+    scaled: Vec<(Domain, F)>,
+}
+
+/// Laws and moduli that have the value of another, or its negative, in a solution: what is one function is cut to one
+/// value, so that both may stand in one expression. Each with that value.
+#[derive(Clone, Debug)]
+pub struct Alike<F> {
+    /// Laws.
+    pub laws: HashMap<Place, F>,
+    /// Moduli of two-ports.
+    pub moduli: HashMap<VertexId, F>,
 }
 
 /// Whether the ports of a field are inertias whose matrix is constant: coupled inductors hold it.
@@ -158,15 +180,44 @@ impl<'g, F: Modular> Bonds<'g, F> {
     ///
     /// # Errors
     /// What has no value in it.
-    pub fn new(graph: &'g BondGraph, draw: Draw, literal: &[bool]) -> Result<Self, Trouble> {
+    pub fn new(
+        graph: &'g BondGraph,
+        draw: Draw,
+        literal: &[bool],
+        alike: Alike<F>,
+    ) -> Result<Self, Trouble> {
+        Self::drawn(graph, draw, literal, alike, false)
+    }
+
+    /// The equations of a scaled graph, what is drawn for its laws and starts being that of the unscaled one.
+    ///
+    /// # Errors
+    /// What has no value in the draw.
+    pub fn of_scaled(graph: &'g BondGraph, draw: Draw) -> Result<Self, Trouble> {
+        Self::drawn(graph, draw, &[], Alike::default(), true)
+    }
+
+    fn drawn(
+        graph: &'g BondGraph,
+        draw: Draw,
+        literal: &[bool],
+        alike: Alike<F>,
+        unscale: bool,
+    ) -> Result<Self, Trouble> {
+        let parameters = parameters(graph, draw, literal)?;
+        let scales = graph.scales.iter().filter(|_| unscale);
+        let scaled = scales
+            .filter_map(|scale| Some((scale.domain, *parameters.get(scale.parameter.index())?)));
         let mut bonds = Bonds {
+            scaled: scaled.collect(),
             graph,
             draw,
-            parameters: parameters(graph, draw, literal)?,
+            parameters,
             system: System { unknowns: 2 * graph.bonds.len(), rows: vec![] },
             origins: vec![],
             cuts: HashMap::new(),
             moduli: vec![],
+            alike,
             stored: HashMap::new(),
             signals: vec![],
             s: draw.of(Of::S),
@@ -224,7 +275,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             }
             // What a rate form stores is counted from its start: s·q − q0 = f.
             Law::Rate { kind, .. } => {
-                let start: F = self.draw.of(Of::InitialStored(end.vertex.0, end.port));
+                let start = self.start(end, false);
                 let integral = self.at(end, kind.integrates()).plus(start, &Form::number(F::ONE));
                 Ok(integral.times(F::ONE / self.s))
             }
@@ -279,9 +330,87 @@ impl<'g, F: Modular> Bonds<'g, F> {
         self.reading().number(expr, &mut |leaf, _| self.leaf(leaf, None))
     }
 
+    /// An unscaled power variable is the graph's own times this.
+    pub fn factor(&self, bond: BondId, power: Power) -> F {
+        let domain = self.graph.bond(bond).domain;
+        let found = self.scaled.iter().find(|(scaled, _)| *scaled == domain);
+        match (found, power) {
+            (None, _) => F::ONE,
+            (Some((_, factor)), Power::Effort) => *factor,
+            (Some((_, factor)), Power::Flow) => F::ONE / *factor,
+        }
+    }
+
+    fn factor_at(&self, end: End, power: Power) -> F {
+        self.graph.bond_at(end).map_or(F::ONE, |bond| self.factor(bond, power))
+    }
+
+    /// The same of what a port stores.
+    fn factor_of_stored(&self, end: End) -> F {
+        self.graph.storage(end).map_or(F::ONE, |kind| self.factor_at(end, kind.integrates()))
+    }
+
+    /// The same of what a port's law gives.
+    fn factor_of_law(&self, end: End) -> F {
+        match self.graph.law_at(end) {
+            Law::Source { sets, .. } => self.factor_at(end, *sets),
+            Law::Dissipator(Dissipation::Linear(_) | Dissipation::Effort(_)) => {
+                self.factor_at(end, Power::Effort)
+            }
+            Law::Dissipator(Dissipation::Flow(_)) => self.factor_at(end, Power::Flow),
+            Law::Store { law: StoreLaw::OfPower(_), .. } => self.factor_of_stored(end),
+            Law::Store { kind, .. } | Law::Rate { kind, .. } => self.factor_at(end, kind.gives()),
+            Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_) | Law::Field(_) => F::ONE,
+        }
+    }
+
+    /// What a storage starts from.
+    fn start(&self, end: End, power: bool) -> F {
+        let (vertex, port) = (end.vertex.0, end.port);
+        match (power, self.graph.storage(end)) {
+            (true, kind) => {
+                let by = kind.map_or(F::ONE, |kind| self.factor_at(end, kind.gives()));
+                self.draw.of::<F>(Of::InitialPower(vertex, port)) / by
+            }
+            (false, _) => {
+                self.draw.of::<F>(Of::InitialStored(vertex, port)) / self.factor_of_stored(end)
+            }
+        }
+    }
+
     fn row(&mut self, origin: Place, form: Form<F>) {
         self.system.rows.push(form);
         self.origins.push(origin);
+    }
+
+    /// The value of an expression of parameters and of signals that nothing but waveforms make, with the functions that
+    /// mean nothing in the field: it is known before anything is solved.
+    fn known(&self, expr: &Expr, depth: usize) -> Option<F> {
+        if depth > DEEPEST_KNOWN {
+            return None;
+        }
+        let leaf = &mut |leaf: &Leaf, _: Span| match leaf {
+            Leaf::Parameter(_) | Leaf::Time => self.leaf(leaf, None),
+            Leaf::Signal(id) => match &self.graph.signals[id.index()].law {
+                SignalLaw::Waveform(_) => Ok(Form::number(self.draw.of(Of::Waveform(id.index())))),
+                SignalLaw::Algebraic(law) => {
+                    self.known(law, depth + 1).map(Form::number).ok_or(Trouble::Nonlinear)
+                }
+                _ => Err(Trouble::Nonlinear),
+            },
+            _ => Err(Trouble::Nonlinear),
+        };
+        self.reading().number(expr, leaf).ok().filter(|value| !value.is_zero())
+    }
+
+    /// The random number of a law or modulus that is cut: its own, or that of all that have its value. What has the
+    /// negative value has the negative number.
+    fn number(&self, own: Of, alike: Option<F>, which: u64) -> F {
+        let Some(value) = alike else { return self.draw.of(own) };
+        match value.value() <= (-value).value() {
+            true => self.draw.opaque(which, &[value]),
+            false => -self.draw.opaque::<F>(which, &[-value]),
+        }
     }
 
     /// The value of a law at a port: its form, or what it is cut to.
@@ -292,13 +421,17 @@ impl<'g, F: Modular> Bonds<'g, F> {
             found => return found,
         }
         let (vertex, port) = (end.vertex.0, end.port);
-        let offset: F = self.draw.of(Of::Offset(vertex, port));
+        let alike = self.alike.laws.get(&Place::Port(end)).copied();
+        let given = self.factor_of_law(end);
+        // What is known stays what it is: its text then has its value wherever it stands.
+        let known = if follows == Follows::Nothing { self.known(&law, 0) } else { None };
+        let drawn = || self.number(Of::Offset(vertex, port), alike, ALIKE_OFFSET) / given;
+        let offset = known.unwrap_or_else(drawn);
+        let drawn = self.number(Of::Slope(vertex, port), alike, ALIKE_SLOPE) / given;
         let (slope, followed): (F, _) = match follows {
             Follows::Nothing => (F::ZERO, Form::number(F::ZERO)),
-            Follows::Stored(end) => (self.draw.of(Of::Slope(vertex, port)), self.stored(end)?),
-            Follows::Port(end, power) => {
-                (self.draw.of(Of::Slope(vertex, port)), self.at(end, power))
-            }
+            Follows::Stored(end) => (drawn * self.factor_of_stored(end), self.stored(end)?),
+            Follows::Port(end, power) => (drawn * self.factor_at(end, power), self.at(end, power)),
         };
         let value = followed.times(slope).plus(offset, &Form::number(F::ONE));
         let cut = Cut { offset, slope, follows, value: value.clone(), law, own };
@@ -358,7 +491,14 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Err(Trouble::Nonlinear) => None,
             Err(trouble) => return Err(trouble),
         };
-        let number: F = known.unwrap_or_else(|| self.draw.of(Of::Slope(id.0, 2)));
+        let alike = self.alike.moduli.get(&id).copied();
+        // What is known stays what it is: its text then has its value wherever it stands.
+        let number = known.or_else(|| self.known(value, 0)).unwrap_or_else(|| {
+            let (given, given_power, other, other_power) = rows[0];
+            let by = self.factor_at(ends[given], given_power);
+            let of = self.factor_at(ends[other], other_power);
+            self.number(Of::Slope(id.0, 2), alike, ALIKE_OFFSET) * of / by
+        });
         if known.is_none() {
             self.moduli.push((value.clone(), id, number));
         }
@@ -406,7 +546,6 @@ impl<'g, F: Modular> Bonds<'g, F> {
         let graph = self.graph;
         let Some(bond) = graph.bond_at(end) else { return Ok(()) };
         let place = Place::Port(end);
-        let (vertex, port) = (end.vertex.0, end.port);
         let own = |power| Expr::leaf(Leaf::Own(Variable::Power(power)));
         match graph.law_at(end) {
             Law::Source { sets, value, .. } => {
@@ -430,7 +569,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Law::Store { kind, law, .. } => {
                 let start = match law {
                     StoreLaw::Linear(size) if self.is_number(size) => {
-                        let power: F = self.draw.of(Of::InitialPower(vertex, port));
+                        let power = self.start(end, true);
                         self.constant(size)? * power
                     }
                     StoreLaw::Linear(size) => {
@@ -454,7 +593,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
             Law::Rate { kind, rate, .. } => {
                 let follows = Follows::Port(end, kind.integrates());
                 let rate = self.law(end, rate.clone(), follows)?;
-                let start: F = self.draw.of(Of::InitialPower(vertex, port));
+                let start = self.start(end, true);
                 let state = self.at(end, kind.gives()).times(self.s);
                 self.row(place, state.minus(&Form::number(start)).minus(&rate));
             }
@@ -468,7 +607,7 @@ impl<'g, F: Modular> Bonds<'g, F> {
         let value = self.law(end, law, Follows::Stored(end))?;
         let row = self.at(end, kind.gives()).minus(&value);
         self.row(Place::Port(end), row);
-        Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)))
+        Ok(self.start(end, false))
     }
 
     /// What a store with a law of its power variable starts from. Coupled inductors start from their currents.
@@ -478,13 +617,13 @@ impl<'g, F: Modular> Bonds<'g, F> {
             _ => false,
         };
         if !coupled {
-            return Ok(self.draw.of(Of::InitialStored(end.vertex.0, end.port)));
+            return Ok(self.start(end, false));
         }
         self.reading().number(law, &mut |leaf, _| match leaf {
             Leaf::Bond { bond, negated, .. } => {
                 let bonds = &self.graph.vertex(end.vertex).bonds;
                 let port = bonds.iter().position(|b| b == bond).unwrap_or(0) as u32;
-                let power: F = self.draw.of(Of::InitialPower(end.vertex.0, port));
+                let power = self.start(End { vertex: end.vertex, port }, true);
                 let outward = self.graph.sign_into(*bond, end.vertex, port) < 0.0;
                 Ok(Form::number(if outward != *negated { -power } else { power }))
             }
@@ -530,9 +669,22 @@ impl<'g, F: Modular> Bonds<'g, F> {
     fn signal_law(&mut self, id: SignalId, law: &Expr) -> Result<Form<F>, Trouble> {
         match self.form(law, None) {
             Err(Trouble::Nonlinear) => {}
-            found => return found,
+            found => {
+                // A law of time alone is a number, which a dialect may spell by other functions: its card is compared.
+                if let Ok(Some(offset)) = found.as_ref().map(Form::as_number)
+                    && speaks_of_time(law)
+                {
+                    let (slope, follows) = (F::ZERO, Follows::Nothing);
+                    let (value, law) = (Form::number(offset), law.clone());
+                    let cut = Cut { offset, slope, follows, value, law, own: None };
+                    self.cuts.insert(Place::Signal(id), cut);
+                }
+                return found;
+            }
         }
-        let offset: F = self.draw.of(Of::Signal(id.index()));
+        let alike = self.alike.laws.get(&Place::Signal(id)).copied();
+        let drawn = || self.number(Of::Signal(id.index()), alike, ALIKE_OFFSET);
+        let offset = self.known(law, 0).unwrap_or_else(drawn);
         let value = Form::number(offset);
         let cut = Cut {
             offset,
@@ -545,6 +697,12 @@ impl<'g, F: Modular> Bonds<'g, F> {
         self.cuts.insert(Place::Signal(id), cut);
         Ok(value)
     }
+}
+
+fn speaks_of_time(law: &Expr) -> bool {
+    let mut found = false;
+    law.leaves(&mut |leaf, _| found |= *leaf == Leaf::Time);
+    found
 }
 
 /// What stands for exp(−s·T) of a delay.

@@ -3,8 +3,8 @@
 use super::super::draw::Modular;
 use super::super::form::{Form, Reading, Trouble};
 use super::super::system::Undetermined;
-use super::{Bonds, Place};
-use crate::bond::graph::{BondId, Expr, Storage, VertexId};
+use super::{Alike, Bonds, Place};
+use crate::bond::graph::{BondId, Expr, Law, Storage, VertexId};
 use std::collections::HashMap;
 
 impl<F: Modular> Bonds<'_, F> {
@@ -21,6 +21,41 @@ impl<F: Modular> Bonds<'_, F> {
     ) -> Result<F, Trouble> {
         Reading { draw: self.draw, cut }
             .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(leaf, own)?.at(solution))))
+    }
+
+    /// Laws and moduli whose value at a solution another has too, or its negative.
+    ///
+    /// # Errors
+    /// What has no value in this draw.
+    pub fn alike(&self, solution: &[F]) -> Result<Alike<F>, Trouble> {
+        let size = |value: F| value.value().min((-value).value());
+        let mut count: HashMap<u64, usize> = HashMap::new();
+        let mut alike = Alike::default();
+        for (place, cut) in &self.cuts {
+            // The ports of a two-port have a modulus in common.
+            let two_port = match place {
+                Place::Port(end) => {
+                    matches!(
+                        self.graph.vertex(end.vertex).law,
+                        Law::Transformer(_) | Law::Gyrator(_)
+                    )
+                }
+                Place::Signal(_) => false,
+            };
+            if !two_port {
+                alike.laws.insert(*place, self.value(&cut.law, cut.own, solution, None)?);
+            }
+        }
+        for (modulus, own, _) in &self.moduli {
+            alike.moduli.insert(*own, self.value(modulus, Some(*own), solution, None)?);
+        }
+        for value in alike.laws.values().chain(alike.moduli.values()) {
+            *count.entry(size(*value)).or_default() += 1;
+        }
+        let shared = |value: &F| !value.is_zero() && count.get(&size(*value)) > Some(&1);
+        alike.laws.retain(|_, value| shared(value));
+        alike.moduli.retain(|_, value| shared(value));
+        Ok(alike)
     }
 
     /// Of every law that is cut the value of its text, and what it was cut to. Laws of one text are cut to different
@@ -82,5 +117,18 @@ impl<F: Modular> Bonds<'_, F> {
             let inertia = self.graph.storage(*end) == Some(Storage::Inertia);
             format!("{}({})", if inertia { 'p' } else { 'q' }, self.graph.port_name(*end))
         })
+    }
+}
+
+impl<F> Default for Alike<F> {
+    fn default() -> Self {
+        Alike { laws: HashMap::new(), moduli: HashMap::new() }
+    }
+}
+
+impl<F> Alike<F> {
+    /// Whether there is nothing to cut alike.
+    pub fn is_empty(&self) -> bool {
+        self.laws.is_empty() && self.moduli.is_empty()
     }
 }

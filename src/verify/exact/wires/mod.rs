@@ -9,15 +9,16 @@
 //!
 //! A behavioural card whose text is affine stands as it is; one that is not is cut as the law that it claims to be.
 
-use super::bonds::{Bonds, Cut, Follows, Place, delay_factor};
+mod cut;
+
+use super::bonds::{Bonds, Place, delay_factor};
 use super::draw::{Modular, Of, decimal};
 use super::form::{Form, Reading, Trouble};
 use super::system::System;
 use super::text::{Start, Text, waveform_of};
-use crate::bond::graph::{self, BondGraph, Law, Memory, ParameterId, Power, SignalId, SignalLaw};
+use crate::bond::graph::{self, BondGraph, Law, ParameterId, SignalId};
 use crate::circuit::{DeviceKind, NodeId};
-use crate::expr::Node;
-use crate::netlist::flatten::scope::{self, ScopeId, TOP};
+use crate::netlist::flatten::scope::{self, ScopeId};
 use crate::netlist::flatten::values::Lookup;
 use crate::netlist::{Element, Expr, Leaf, Name, Waveform};
 use std::cell::RefCell;
@@ -38,16 +39,18 @@ pub struct CutCard {
 pub struct Wires<'t, F> {
     /// The text.
     pub text: &'t Text<'t>,
-    lookup: Lookup<'t, 't>,
+    pub(super) lookup: Lookup<'t, 't>,
     graph: &'t BondGraph,
     bonds: &'t Bonds<'t, F>,
     /// By the name of a parameter at the top: the graph's.
-    parameters: HashMap<Name, usize>,
+    parameters: HashMap<(u32, Name), usize>,
     known: RefCell<HashMap<(u32, Name), F>>,
     /// The equations.
     pub system: System<F>,
     /// By device: its current.
     currents: Vec<Form<F>>,
+    /// By node: the first that sources of 0 V join it to.
+    joined: Vec<u32>,
     /// Cards that were cut.
     pub cuts: Vec<CutCard>,
     /// Devices that cannot be read, and why.
@@ -63,13 +66,16 @@ impl<'t, F: Modular> Wires<'t, F> {
         let parameters = text.parameters.iter().enumerate();
         let mut wires = Wires {
             text,
-            lookup: Lookup::new(&text.flat, &text.netlist.names),
+            lookup: Lookup::new(&text.flat, &text.names),
             graph: bonds.graph,
             bonds,
-            parameters: parameters.filter_map(|(k, name)| Some(((*name)?, k))).collect(),
+            parameters: parameters
+                .filter_map(|(k, place)| place.map(|(scope, name)| ((scope.0, name), k)))
+                .collect(),
             known: RefCell::new(HashMap::new()),
             system: System { unknowns: text.circuit.nodes.len() - 1, rows: vec![] },
             currents: vec![Form::number(F::ZERO); text.flat.devices.len()],
+            joined: cut::joined(text),
             cuts: vec![],
             strange: vec![],
         };
@@ -196,7 +202,7 @@ impl<'t, F: Modular> Wires<'t, F> {
     /// # Errors
     /// What is not there.
     pub fn leaf(&self, scope: ScopeId, leaf: &Leaf) -> Result<Form<F>, Trouble> {
-        let names = &self.text.netlist.names;
+        let names = &self.text.names;
         let unknown = |name: Name| Trouble::Unknown(names.text(name).to_string());
         let node = |name: Name| {
             let node = self.lookup.node(scope, name, crate::source::Span::NONE, &mut vec![]);
@@ -214,6 +220,9 @@ impl<'t, F: Modular> Wires<'t, F> {
             }
             Leaf::Time => Ok(Form::number(self.bonds.draw.of(Of::Time))),
             Leaf::Operator(..) => Err(Trouble::Nonlinear),
+            // They stand in outputs alone.
+            Leaf::Power(name) => Err(unknown(*name)),
+            Leaf::Part(_, inner) => self.leaf(scope, inner),
         }
     }
 
@@ -234,19 +243,18 @@ impl<'t, F: Modular> Wires<'t, F> {
 
     /// A parameter: the graph's where it has one of this name, else as the text defines it.
     fn parameter(&self, scope: ScopeId, name: Name) -> Result<F, Trouble> {
+        let (scope, name) = self.lookup.parameter(scope, name);
         let scopes = &self.text.flat.scopes;
         let found =
             scopes.around(scope).find_map(|(id, scope)| Some((id, *scope.written.get(&name)?)));
-        let text = self.text.netlist.names.text(name);
+        let text = self.text.names.text(name);
         let Some((id, (within, expr))) = found else {
             return scope::constant(text)
                 .and_then(decimal)
                 .ok_or_else(|| Trouble::Unknown(text.to_string()));
         };
-        if id == TOP
-            && let Some(value) =
-                self.parameters.get(&name).and_then(|k| self.bonds.parameters.get(*k))
-        {
+        let drawn = self.parameters.get(&(id.0, name));
+        if let Some(value) = drawn.and_then(|k| self.bonds.parameters.get(*k)) {
             return Ok(*value);
         }
         if let Some(value) = self.known.borrow().get(&(id.0, name)) {
@@ -262,10 +270,10 @@ impl<'t, F: Modular> Wires<'t, F> {
     /// # Errors
     /// What has no value in this draw.
     pub fn written_parameter(&self, id: ParameterId) -> Result<Option<F>, Trouble> {
-        let Some(name) = self.text.parameters.get(id.index()).copied().flatten() else {
+        let Some((scope, name)) = self.text.parameters.get(id.index()).copied().flatten() else {
             return Ok(None);
         };
-        let written = self.text.flat.scopes.get(TOP).written.get(&name);
+        let written = self.text.flat.scopes.get(scope).written.get(&name);
         let Some((scope, expr)) = written else { return Ok(None) };
         let mut parameters = 0;
         expr.leaves(&mut |_, _| parameters += 1);
@@ -431,6 +439,7 @@ impl<'t, F: Modular> Wires<'t, F> {
                 let is_voltage = matches!(element, Element::BehaviouralVoltage { .. });
                 let value = match self.form(pending_scope, law) {
                     Err(Trouble::Nonlinear) => self.cut(device, is_voltage)?,
+                    Ok(_) if self.must_be_cut(device) => self.cut(device, is_voltage)?,
                     found => found?,
                 };
                 let given = if is_voltage { voltage } else { current };
@@ -486,114 +495,6 @@ impl<'t, F: Modular> Wires<'t, F> {
         self.text.header.samples.iter().any(|sample| sample.clock.eq_ignore_ascii_case(&name))
     }
 
-    /// What a behavioural card that is not affine is cut to.
-    fn cut(&mut self, device: usize, is_voltage: bool) -> Result<Form<F>, Trouble> {
-        let place = self.text.claims[device];
-        if let Some(Place::Signal(id)) = place
-            && let SignalLaw::Memory { kind: Memory::Hysteresis { .. }, .. } =
-                self.graph.signals[id.index()].law
-            && self.text.gives_memory(device)
-        {
-            return Ok(Form::number(self.bonds.draw.of(Of::Remembered(id.index()))));
-        }
-        let cut = place.and_then(|place| Some((place, self.bonds.cuts.get(&place)?)));
-        let Some((place, cut)) = cut else {
-            let message = "it computes what no law of the bond graph says";
-            self.strange.push((device, message.to_string()));
-            return Ok(Form::number(self.bonds.draw.of(Of::Unclaimed(device))));
-        };
-        let turned = self.turned(device, place);
-        self.cuts.push(CutCard { device, place, turned });
-        let followed = self.followed(device, is_voltage, cut, turned)?;
-        let value = followed.times(cut.slope).plus(cut.offset, &Form::number(F::ONE));
-        Ok(if turned { value.times(-F::ONE) } else { value })
-    }
-
-    /// Whether a card gives the negative of a law.
-    fn turned(&self, device: usize, place: Place) -> bool {
-        let Place::Port(end) = place else { return false };
-        // An integrator's feed says the rate or the stored quantity itself; a source's current is its bond's flow.
-        let along = match self.graph.law_at(end) {
-            Law::Rate { .. } => return false,
-            Law::Store { law: crate::bond::graph::StoreLaw::OfPower(_), .. } => return false,
-            Law::Source { sets: Power::Flow, .. } => self
-                .graph
-                .bond_at(end)
-                .is_some_and(|bond| self.graph.sign_into(bond, end.vertex, end.port) < 0.0),
-            _ => false,
-        };
-        self.stands_turned(device, end) ^ along
-    }
-
-    /// Whether a device stands with its first node at the − of a port.
-    fn stands_turned(&self, device: usize, end: crate::bond::graph::End) -> bool {
-        let Some(effort) = self.text.effort(self.graph, end) else { return false };
-        let own = self.between(&self.text.circuit.devices[device].nodes);
-        match self.form(TOP, effort) {
-            Ok(effort) => effort.times(-F::ONE) == own && !own.terms.is_empty(),
-            Err(_) => false,
-        }
-    }
-
-    /// What a cut law follows, in the unknowns of the circuit.
-    fn followed(
-        &self,
-        device: usize,
-        is_voltage: bool,
-        cut: &Cut<F>,
-        turned: bool,
-    ) -> Result<Form<F>, Trouble> {
-        let signed = |form: Form<F>, negative: bool| {
-            if negative { form.times(-F::ONE) } else { form }
-        };
-        match cut.follows {
-            Follows::Nothing => Ok(Form::number(F::ZERO)),
-            Follows::Stored(end) => match self.text.stored(self.graph, end) {
-                Some(expr) => self.form(TOP, expr),
-                None => Err(Trouble::Unknown(format!("what {} stores", self.graph.port_name(end)))),
-            },
-            Follows::Port(end, Power::Effort) => {
-                let own = self.text.claims[device] == Some(Place::Port(end)) && !is_voltage;
-                let feeds = matches!(self.graph.law_at(end), Law::Rate { .. });
-                if own && !feeds {
-                    let voltage = self.between(&self.text.circuit.devices[device].nodes);
-                    return Ok(signed(voltage, turned));
-                }
-                match self.text.effort(self.graph, end) {
-                    Some(expr) => self.form(TOP, expr),
-                    None => Err(Trouble::Unknown(format!("e({})", self.graph.port_name(end)))),
-                }
-            }
-            Follows::Port(end, Power::Flow) => {
-                // The current of a voltage source that stands at the port.
-                let effort = self.text.effort(self.graph, end).map(|expr| self.form(TOP, expr));
-                let devices = self.text.devices.get(&Place::Port(end)).into_iter().flatten();
-                for other in devices {
-                    let kind = &self.text.circuit.devices[*other].kind;
-                    let carries = matches!(
-                        kind,
-                        DeviceKind::Vcvs { .. }
-                            | DeviceKind::Ccvs { .. }
-                            | DeviceKind::BehaviouralVoltage { .. }
-                    );
-                    let own = self.between(&self.text.circuit.devices[*other].nodes);
-                    let current = self.currents[*other].clone();
-                    match &effort {
-                        Some(Ok(effort)) if carries && *effort == own => return Ok(current),
-                        Some(Ok(effort)) if carries && effort.clone().times(-F::ONE) == own => {
-                            return Ok(current.times(-F::ONE));
-                        }
-                        _ => {}
-                    }
-                }
-                match self.text.flow(self.graph, end) {
-                    Some((expr, negative)) => Ok(signed(self.form(TOP, expr)?, negative)),
-                    None => Err(Trouble::Unknown(format!("f({})", self.graph.port_name(end)))),
-                }
-            }
-        }
-    }
-
     /// The value of a device's own variable: the current of a current source, the voltage of any other.
     pub fn own_value(&self, device: usize, solution: &[F]) -> F {
         match self.text.circuit.devices[device].kind {
@@ -624,14 +525,5 @@ impl<'t, F: Modular> Wires<'t, F> {
             Some(Place::Signal(id)) => Some(id),
             _ => None,
         }
-    }
-}
-
-/// Whether an expression is one leaf, or its negative.
-pub fn is_leaf(expr: &Expr) -> bool {
-    match &*expr.node {
-        Node::Leaf(_) => true,
-        Node::Unary(_, inner) => matches!(*inner.node, Node::Leaf(_)),
-        _ => false,
     }
 }

@@ -1,0 +1,385 @@
+//! A circuit that is ready to run: which analysis, over which steps, with which columns.
+
+use super::measures::{self, Measured, Measuring};
+use super::pipeline::{self, Deck, Language, Units};
+use crate::bond::elaborate::Overrides;
+use crate::circuit::stamps::{self, Stamps};
+use crate::circuit::{Analysis, Axis, Circuit, sweep};
+use crate::diagnostic::{Diagnostic, has_errors};
+use crate::quantity::nearest;
+use crate::sim::analyses::{self, ANALYSES, Job};
+use crate::sim::{self, Failure, FailureKind, Interval, Progress, Settings, Statistics, System};
+use crate::source::{FileId, SourceMap, Span};
+use crate::trace::measure::Measure;
+use crate::trace::{Sink, Trace};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// A circuit that is ready to run.
+pub struct Run {
+    /// The title of the netlist.
+    pub title: String,
+    /// Headers of the columns, `step` first where there are steps, then time, frequency or what is swept.
+    pub names: Vec<String>,
+    /// Their units.
+    pub units: Vec<String>,
+    /// What the circuit comes down to.
+    pub stamps: Stamps,
+    /// The same, ready to be solved; with steps that of the first.
+    pub system: System,
+    /// How the transient is run; `None` for other analyses.
+    pub settings: Option<Settings>,
+    /// Analyses that the text asks for.
+    pub analyses: usize,
+    /// The one that is run.
+    pub analysis: Analysis,
+    /// Everything is run at each of these values.
+    pub steps: Vec<Axis>,
+    /// What is measured in it.
+    pub measures: Vec<Measure>,
+    /// Headers of all columns, those that are only measured included.
+    all: Vec<String>,
+    circuit: Circuit,
+    /// Tolerances of analyses without time.
+    still: Settings,
+    native: bool,
+    deck: Option<Deck>,
+}
+
+/// From a text to a circuit ready to run. Of several analyses the last, unless one is picked by its name.
+pub fn prepare(
+    map: &mut SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    pick: Option<&str>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
+    if let Some(name) = pick
+        && analyses::row(name).is_none()
+    {
+        d.push(unknown(name));
+        return None;
+    }
+    if pipeline::language(map, file) == Language::Bond {
+        let (circuit, units) = pipeline::circuit(map, file, overrides, d)?;
+        if circuit.analyses.is_empty() {
+            let message = "nothing says until when to simulate";
+            let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
+            d.push(Diagnostic::error("E0806", Span::NONE, message).help(help));
+            return None;
+        }
+        return ready(circuit, &units, true, pick, d);
+    }
+    let deck = pipeline::deck(map, file, overrides, d)?;
+    let mut circuit = deck.circuit(&[], pick, d)?;
+    if !circuit.steps.is_empty() {
+        let steps = std::mem::take(&mut circuit.steps);
+        let mut said = vec![];
+        let first = deck.circuit(&pairs(&steps, 0, &mut vec![]), pick, &mut said);
+        let new: Vec<_> = said.into_iter().filter(|found| !says(d, found)).collect();
+        d.extend(new);
+        circuit = first?;
+        circuit.steps = steps;
+    }
+    let mut run = ready(circuit, &deck.units, false, pick, d)?;
+    run.deck = Some(deck);
+    Some(run)
+}
+
+/// Names and values of a step.
+fn pairs<'a>(steps: &'a [Axis], step: u64, values: &mut Vec<f64>) -> Vec<(&'a str, f64)> {
+    sweep::values(steps, step, values);
+    let names = steps.iter().flat_map(|axis| axis.names.iter().map(String::as_str));
+    names.zip(values.iter().copied()).collect()
+}
+
+fn unknown(name: &str) -> Diagnostic {
+    let names = || ANALYSES.iter().map(|row| row.name);
+    let error = Diagnostic::error("E0944", Span::NONE, format!("no analysis is called `{name}`"));
+    match nearest(name, names()) {
+        Some(meant) => error.help(format!("did you mean `{meant}`?")),
+        None => error.because(format!("known are {}", names().collect::<Vec<_>>().join(", "))),
+    }
+}
+
+/// Makes a circuit ready to run. `native`: it comes from a bond graph.
+pub fn ready(
+    circuit: Circuit,
+    units: &Units,
+    native: bool,
+    pick: Option<&str>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
+    let stamps = stamps::stamp(&circuit, d)?;
+    let wanted = match pick {
+        Some("op") => Some(Analysis::OperatingPoint),
+        Some(name) => circuit.analyses.iter().rev().find(|a| a.name() == name).cloned(),
+        None => circuit.analyses.last().cloned(),
+    };
+    let before = d.len();
+    let point = matches!(wanted, Some(Analysis::OperatingPoint));
+    let timed = matches!(wanted, None | Some(Analysis::Transient { .. }));
+    let mut settings = None;
+    let mut still = Settings::new(1.0);
+    if timed && pick.is_none_or(|name| name == "tran" || wanted.is_some()) {
+        settings = Some(Settings::of(&circuit, native, d)?);
+    } else if !point {
+        for (key, value) in &circuit.options {
+            if let Err(found) = still.set(key, value) {
+                d.push(*found);
+            }
+        }
+    }
+    // What the file's own options are wrong about has been said at their place.
+    let (said, again) = d.split_at(before);
+    let again: Vec<_> = again.iter().filter(|d| !says(said, d)).cloned().collect();
+    d.truncate(before);
+    d.extend(again);
+    if has_errors(&d[before..]) {
+        return None;
+    }
+    if let Some(settings) = &settings {
+        limit_rows(settings, d)?;
+    }
+    let Some(analysis) = wanted else {
+        let name = pick.unwrap_or("tran");
+        let card = analyses::row(name).map_or("", |row| row.card);
+        let message = format!("the netlist has no `.{name}`");
+        d.push(Diagnostic::error("E0806", Span::NONE, message).help(format!("add `{card}`")));
+        return None;
+    };
+    let system = sim::compile(&stamps, d)?;
+    let row = analyses::row(analysis.name())?;
+    let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
+    let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
+    let (mut names, mut units): (Vec<String>, Vec<String>) = columns
+        .map(|(name, unit)| {
+            let unit = if unit.is_empty() { pipeline::unit_of(&name, units) } else { unit.into() };
+            (name, unit)
+        })
+        .unzip();
+    let all = names.clone();
+    names.truncate(measures::shown(&all));
+    units.truncate(names.len());
+    let mut seen = std::collections::HashSet::new();
+    if let Some(name) = names.iter().find(|name| !seen.insert(name.as_str())) {
+        let message = format!("two columns are called `{name}`");
+        let help = "give one of them another name with `as`";
+        d.push(Diagnostic::error("E0945", Span::NONE, message).help(help));
+        return None;
+    }
+    let own = analysis.name();
+    let (measures, others): (Vec<_>, Vec<_>) = circuit
+        .measures
+        .iter()
+        .cloned()
+        .partition(|measure| measure.analysis.is_empty() || measure.analysis == own);
+    if let Some(other) = others.first() {
+        let message = format!("measures of `{}` are not taken: `{own}` is run", other.analysis);
+        let warning = Diagnostic::warning("W0792", other.span, message);
+        d.push(warning.help("pick the analysis with --analysis"));
+    }
+    Some(Run {
+        measures,
+        all,
+        title: circuit.title.clone(),
+        names,
+        units,
+        stamps,
+        system,
+        settings,
+        analyses: circuit.analyses.len(),
+        analysis,
+        steps: circuit.steps.clone(),
+        circuit,
+        still,
+        native,
+        deck: None,
+    })
+}
+
+/// Whether a warning or error has been said, wherever.
+fn says(said: &[Diagnostic], diagnostic: &Diagnostic) -> bool {
+    said.iter().any(|d| (d.code, &d.message) == (diagnostic.code, &diagnostic.message))
+}
+
+/// More rows than this are a slip of the pen.
+const MOST_ROWS: f64 = 1e9;
+
+fn limit_rows(settings: &Settings, d: &mut Vec<Diagnostic>) -> Option<()> {
+    let Interval::Grid(step) = settings.rows else { return Some(()) };
+    let span = settings.stop - settings.start;
+    if span / step <= MOST_ROWS {
+        return Some(());
+    }
+    let message = format!("a row every {step:e} s for {span:e} s: that is more than 1e9 rows");
+    let error = Diagnostic::error("E0807", Span::NONE, message);
+    d.push(error.help("end the run earlier (--until), or give a longer output interval (--step)"));
+    None
+}
+
+impl Run {
+    /// Lets a flag end the run, and tells of progress.
+    pub fn watch(&mut self, interrupt: Arc<AtomicBool>, progress: Option<Progress>) {
+        for settings in self.settings.iter_mut().chain([&mut self.still]) {
+            settings.interrupt = Some(interrupt.clone());
+            settings.progress = progress.clone();
+        }
+    }
+
+    /// Runs, and sends rows to a sink.
+    ///
+    /// # Errors
+    /// Why the run did not reach its end.
+    pub fn go(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+        self.go_measured(sink).0
+    }
+
+    /// Runs, and sends rows to a sink; also tells what was measured.
+    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
+        let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
+        let mut measuring = Measuring::new(sink, &self.measures, &self.all, times);
+        let result = self.analyse(&mut measuring);
+        (result, measuring.finish())
+    }
+
+    fn analyse(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+        if self.steps.is_empty() {
+            let settings = self.settings.as_ref().unwrap_or(&self.still);
+            return self.one(&self.circuit, &self.stamps, &self.system, settings, &[], sink);
+        }
+        let mut total = Statistics::default();
+        let mut values = vec![];
+        for step in 0..sweep::total(&self.steps) {
+            let pairs = pairs(&self.steps, step, &mut values);
+            let outcome = self.step(step, &pairs, sink);
+            let outcome = outcome.map_err(|failure| at_step(failure, step, &pairs))?;
+            let mut sum = outcome;
+            sum.add(&total);
+            total = sum;
+        }
+        Ok(total)
+    }
+
+    /// One step: the circuit with its values.
+    fn step(
+        &self,
+        step: u64,
+        pairs: &[(&str, f64)],
+        sink: &mut dyn Sink,
+    ) -> Result<Statistics, Failure> {
+        let mut sink = Stepped { to: sink, row: vec![step as f64] };
+        let base = self.settings.as_ref().unwrap_or(&self.still);
+        if step == 0 {
+            return self.one(&self.circuit, &self.stamps, &self.system, base, pairs, &mut sink);
+        }
+        let circuit = self.vary(pairs).map_err(input)?;
+        let mut d = vec![];
+        let stamps = stamps::stamp(&circuit, &mut d);
+        let made =
+            stamps.and_then(|stamps| sim::compile(&stamps, &mut d).map(|system| (stamps, system)));
+        let Some((stamps, system)) = made else { return Err(input(d)) };
+        if stamps.outputs.len() != self.stamps.outputs.len() {
+            let message = "this step has other columns than the first";
+            return Err(input(vec![Diagnostic::error("E0810", Span::NONE, message)]));
+        }
+        let mut settings = base.clone();
+        if self.settings.is_some() && circuit.analyses != self.circuit.analyses {
+            let own = Settings::of(&circuit, self.native, &mut d).ok_or_else(|| input(d))?;
+            let Settings { rows, interrupt, progress, .. } = settings;
+            settings = Settings { rows, interrupt, progress, ..own };
+        }
+        self.one(&circuit, &stamps, &system, &settings, pairs, &mut sink)
+    }
+
+    fn one(
+        &self,
+        circuit: &Circuit,
+        stamps: &Stamps,
+        system: &System,
+        settings: &Settings,
+        pairs: &[(&str, f64)],
+        sink: &mut dyn Sink,
+    ) -> Result<Statistics, Failure> {
+        let name = self.analysis.name();
+        let own = circuit.analyses.iter().rev().find(|analysis| analysis.name() == name);
+        let vary = |more: &[(&str, f64)]| {
+            let all: Vec<(&str, f64)> = pairs.iter().chain(more).copied().collect();
+            self.vary(&all)
+        };
+        // Frequencies of the command line stay in every step.
+        let own = own.filter(|_| !matches!(self.analysis, Analysis::Ac { .. }));
+        let analysis = own.unwrap_or(&self.analysis);
+        let job = Job { circuit, stamps, system, analysis, settings, vary: &vary };
+        match analyses::row(name) {
+            Some(row) => (row.run)(&job, sink),
+            None => Err(input(vec![unknown(name)])),
+        }
+    }
+
+    /// The circuit with other values.
+    fn vary(&self, pairs: &[(&str, f64)]) -> Result<Circuit, Vec<Diagnostic>> {
+        let mut d = vec![];
+        let made = match &self.deck {
+            Some(deck) => deck.circuit(pairs, Some(self.analysis.name()), &mut d),
+            None => None,
+        };
+        made.ok_or(d)
+    }
+
+    /// An empty trace with this run's columns.
+    pub fn trace(&self) -> Trace {
+        Trace::new(self.names.clone(), self.units.clone())
+    }
+}
+
+/// A failure for what is wrong with the circuit of a step.
+fn input(found: Vec<Diagnostic>) -> Failure {
+    sim::analyses::no_circuit(found, &Statistics::default())
+}
+
+fn at_step(mut failure: Failure, step: u64, pairs: &[(&str, f64)]) -> Failure {
+    let values: Vec<String> =
+        pairs.iter().map(|(name, value)| format!("{name} = {value:e}")).collect();
+    if failure.kind != FailureKind::Output {
+        failure.diagnostic.notes.push(format!("in step {step}: {}", values.join(", ")));
+    }
+    failure
+}
+
+/// Puts the number of the step before each row.
+struct Stepped<'a> {
+    to: &'a mut dyn Sink,
+    row: Vec<f64>,
+}
+
+impl Sink for Stepped<'_> {
+    fn row(&mut self, values: &[f64]) -> std::io::Result<()> {
+        self.row.truncate(1);
+        self.row.extend_from_slice(values);
+        self.to.row(&self.row)
+    }
+}
+
+/// Runs a text from memory; its name's ending says what it is written in. For tests and small programs.
+///
+/// # Errors
+/// Everything that was said, errors and warnings.
+pub fn run_text(
+    name: &str,
+    text: &str,
+    overrides: &Overrides,
+) -> Result<(Trace, Statistics), Vec<Diagnostic>> {
+    let mut map = SourceMap::default();
+    let file = map.add(name, text);
+    let mut d = vec![];
+    let Some(run) = prepare(&mut map, file, overrides, None, &mut d) else { return Err(d) };
+    let mut trace = run.trace();
+    match run.go(&mut trace) {
+        Ok(statistics) => Ok((trace, statistics)),
+        Err(failure) => {
+            d.push(*failure.diagnostic);
+            Err(d)
+        }
+    }
+}

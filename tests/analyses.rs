@@ -1,0 +1,208 @@
+//! `.dc`, `.ac`, `.tf`, `.step` and `.data` against closed forms, separate runs, and ngspice's figures.
+//!
+//! Tolerances: 1e-9 of the value against closed forms, equal bits for steps against separate runs, 1e-6 of the value
+//! against what ngspice 39 prints with seven figures.
+
+use bondspice::bond::elaborate::Overrides;
+use bondspice::cli::pipeline::{prepare, run_text};
+use bondspice::source::SourceMap;
+use bondspice::trace::Trace;
+use std::f64::consts::TAU;
+
+fn run(deck: &str) -> Trace {
+    match run_text("deck.cir", &format!("title\n{deck}\n.end\n"), &Overrides::default()) {
+        Ok((trace, _)) => trace,
+        Err(d) => panic!("{deck}\n{d:#?}"),
+    }
+}
+
+fn errors(deck: &str) -> Vec<&'static str> {
+    let found = run_text("deck.cir", &format!("title\n{deck}\n.end\n"), &Overrides::default());
+    found.expect_err(deck).iter().map(|d| d.code).filter(|code| code.starts_with('E')).collect()
+}
+
+fn column<'t>(trace: &'t Trace, name: &str) -> &'t [f64] {
+    trace.column(name).unwrap_or_else(|| panic!("no {name} in {:?}", trace.names))
+}
+
+/// The largest |ours − exact| by |exact| of a phasor column.
+fn misfit(trace: &Trace, name: &str, exact: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let (re, im) = (column(trace, &format!("{name}.re")), column(trace, &format!("{name}.im")));
+    let rows = column(trace, "frequency").iter().zip(re.iter().zip(im));
+    rows.map(|(f, (re, im))| {
+        let (x, y) = exact(*f);
+        (re - x).hypot(im - y) / x.hypot(y)
+    })
+    .fold(0.0, f64::max)
+}
+
+fn divide((a, b): (f64, f64), (c, d): (f64, f64)) -> (f64, f64) {
+    let size = c * c + d * d;
+    ((a * c + b * d) / size, (b * c - a * d) / size)
+}
+
+#[test]
+fn a_resonant_circuit_in_ac() {
+    let trace = run(
+        "v1 in 0 0 ac 1\nr1 in a 10\nl1 a out 1m\nc1 out 0 1u\n.ac dec 7 100 1meg\n.print ac v(out) vdb(out) i(l1)",
+    );
+    let bottom = |f: f64| (1.0 - (TAU * f).powi(2) * 1e-9, TAU * f * 1e-5);
+    assert!(misfit(&trace, "v(out)", |f| divide((1.0, 0.0), bottom(f))) < 1e-9);
+    assert!(misfit(&trace, "i(l1)", |f| divide((0.0, TAU * f * 1e-6), bottom(f))) < 1e-9);
+    for ((f, db), _) in column(&trace, "frequency").iter().zip(column(&trace, "vdb(out)")).zip(0..)
+    {
+        let (x, y) = bottom(*f);
+        assert!((db + 20.0 * x.hypot(y).log10()).abs() < 1e-9, "{f}");
+    }
+}
+
+#[test]
+fn a_capacitor_beside_a_source_carries_its_current() {
+    // Over time the source is constant, so that the charge never moves; in phasors it does.
+    let trace = run("v1 a 0 5 ac 2\nc1 a 0 3u\n.ac lin 3 10 1000\n.print ac i(v1) i(c1)");
+    assert!(misfit(&trace, "i(c1)", |f| (0.0, TAU * f * 3e-6 * 2.0)) < 1e-9);
+    assert!(misfit(&trace, "i(v1)", |f| (0.0, -TAU * f * 3e-6 * 2.0)) < 1e-9);
+}
+
+#[test]
+fn coupled_inductors_and_a_line_in_ac() {
+    let trace = run(
+        "v1 a 0 0 ac 1\nl1 a 0 4m\nl2 b 0 1m\nk1 l1 l2 0.5\nr2 b 0 50\n.ac list 10 1k 100k\n.print ac v(b)",
+    );
+    // v2 = M/L1·v1 behind the leakage L2·(1 − k²).
+    let exact = |f: f64| divide((0.25 * 50.0, 0.0), (50.0, TAU * f * 1e-3 * 0.75));
+    assert!(misfit(&trace, "v(b)", exact) < 1e-9);
+    let trace = run(
+        "v1 in 0 0 ac 1\nr1 in a 50\nt1 a 0 b 0 z0=75 td=10n\nr2 b 0 20\n.ac lin 21 1meg 200meg\n.print ac v(b)",
+    );
+    // V(b) = E·Z·Zl / ((Zs·Zl + Z²)·j·sin θ + Z·(Zs + Zl)·cos θ)
+    let exact = |f: f64| {
+        let theta = TAU * f * 10e-9;
+        let bottom = (75.0 * 70.0 * theta.cos(), (50.0 * 20.0 + 75.0 * 75.0) * theta.sin());
+        divide((75.0 * 20.0, 0.0), bottom)
+    };
+    assert!(misfit(&trace, "v(b)", exact) < 1e-9);
+}
+
+#[test]
+fn a_diode_is_linear_at_its_operating_point() {
+    // The current source sets the current, so gd = I/(n·Vt) up to Is.
+    let trace =
+        run("i1 0 a 1m ac 1\nd1 a 0 dm\n.model dm d(is=1e-14)\n.ac list 1k\n.print ac v(a)");
+    let vt = 1.380_649e-23 / 1.602_176_634e-19 * 300.15;
+    let resistance = column(&trace, "v(a).re")[0];
+    assert!((resistance / (vt / 1e-3) - 1.0).abs() < 1e-5, "{resistance}");
+}
+
+#[test]
+fn transfer_functions_of_dividers_and_amplifiers() {
+    let trace = run("v1 in 0 1\nr1 in out 1k\nr2 out 0 3k\n.tf v(out) v1");
+    let row = |trace: &Trace| trace.columns.iter().map(|column| column[0]).collect::<Vec<_>>();
+    for (ours, exact) in row(&trace).iter().zip([0.75, 4000.0, 750.0]) {
+        assert!((ours / exact - 1.0).abs() < 1e-9, "{:?}", trace.columns);
+    }
+    // An inverting amplifier of gain A: −A·R2/(R2 + R1·(1 + A)).
+    let trace = run("v1 in 0 0\nr1 in n 1k\nr2 n out 10k\ne1 out 0 0 n 1e4\n.tf v(out) v1");
+    let gain = -1e4 * 10.0 / (10.0 + 1.0 + 1e4);
+    assert!((row(&trace)[0] / gain - 1.0).abs() < 1e-9);
+    let trace = run("i1 0 a 1m\nr1 a 0 2k\nr2 a b 1k\nv2 b 0 0\n.tf i(v2) i1");
+    for (ours, exact) in row(&trace).iter().zip([2.0 / 3.0, 2000.0 / 3.0, 3000.0]) {
+        assert!((ours / exact - 1.0).abs() < 1e-9, "{:?}", trace.columns);
+    }
+}
+
+#[test]
+fn a_diode_over_its_voltage_as_ngspice_has_it() {
+    let trace = run(
+        "v1 a 0 0\nr1 a b 100\nd1 b 0 dm\n.model dm d(is=1e-14 n=1.5)\n.dc v1 -1 1 0.5\n.print dc v(b) i(v1)",
+    );
+    assert_eq!(trace.names, ["v1", "v(b)", "i(v1)"]);
+    assert_eq!(column(&trace, "v1"), [-1.0, -0.5, 0.0, 0.5, 1.0]);
+    for (v1, (vb, i)) in
+        column(&trace, "v1").iter().zip(column(&trace, "v(b)").iter().zip(column(&trace, "i(v1)")))
+    {
+        // Kirchhoff's law, and with forward voltage the diode's own.
+        assert!(((v1 - vb) / 100.0 + i).abs() < 1e-9 * i.abs() + 1e-15);
+        let thermal = 1.5 * 1.380_649e-23 / 1.602_176_634e-19 * 300.15;
+        if *v1 > 0.0 {
+            let exact = 1e-14 * ((vb / thermal).exp() - 1.0);
+            assert!((exact + i).abs() < 1e-4 * i.abs(), "{v1} {i} {exact}");
+        }
+    }
+}
+
+#[test]
+fn sweeps_nest_and_set_parameters_devices_and_tables() {
+    let divider = "v1 a 0 1\nr1 a b {r}\nr2 b 0 1k\n.param r=1k\n.print dc v(b) r1:r {r}";
+    let trace = run(&format!("{divider}\n.dc v1 1 2 1 r 1k 3k 2k"));
+    assert_eq!(column(&trace, "v1"), [1.0, 2.0, 1.0, 2.0]);
+    assert_eq!(column(&trace, "r1:r"), [1e3, 1e3, 3e3, 3e3]);
+    for (v, exact) in column(&trace, "v(b)").iter().zip([0.5, 1.0, 0.25, 0.5]) {
+        assert!((v - exact).abs() < 1e-12);
+    }
+    let trace = run(&format!("{divider}\n.dc r2 list 1k 3k"));
+    assert!((column(&trace, "v(b)")[1] - 0.75).abs() < 1e-12);
+    let trace =
+        run(&format!("{divider}\n.data points r v1\n+ 1k 4\n+ 3k 8\n.enddata\n.dc data=points"));
+    assert!((column(&trace, "v(b)")[1] - 2.0).abs() < 1e-12, "{trace:?}");
+    let trace = run(&format!("{divider}\n.dc dec v1 1 100 1"));
+    assert_eq!(column(&trace, "v1"), [1.0, 10.0, 100.0]);
+}
+
+#[test]
+fn steps_are_separate_runs_bit_for_bit() {
+    let deck = |r: &str, step: &str| {
+        format!(
+            "v1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\nd1 b 0 dm\n.model dm d(is=1e-14)\n.tran 10u 2m\n.print tran v(b)\n{step}"
+        )
+    };
+    let stepped = run(&deck("{r}", ".param r=1\n.step param r list 100 330 1k"));
+    assert_eq!(stepped.names, ["step", "time", "v(b)"]);
+    let mut from = 0;
+    for (k, r) in ["100", "330", "1k"].iter().enumerate() {
+        let alone = run(&deck(r, ""));
+        let to = from + alone.rows();
+        assert!(column(&stepped, "step")[from..to].iter().all(|step| *step == k as f64));
+        assert_eq!(&column(&stepped, "time")[from..to], column(&alone, "time"));
+        assert_eq!(&column(&stepped, "v(b)")[from..to], column(&alone, "v(b)"));
+        from = to;
+    }
+    assert_eq!(from, stepped.rows());
+    // The first of two runs fastest.
+    let nested = run(
+        "v1 a 0 {x*10+y}\nr1 a 0 1\n.param x=0 y=0\n.op\n.step x 1 2 1\n.step y 1 2 1\n.print op v(a)",
+    );
+    assert_eq!(column(&nested, "v(a)"), [11.0, 21.0, 12.0, 22.0]);
+}
+
+#[test]
+fn an_analysis_is_picked_by_its_name() {
+    let text = "t\nv1 a 0 1 ac 1\nr1 a b 1k\nc1 b 0 1u\n.dc v1 1 2 1\n.ac list 1k\n.op\n.end\n";
+    for (pick, first, rows) in [("dc", "v1", 2), ("ac", "frequency", 1), ("op", "v(a)", 1)] {
+        let mut map = SourceMap::default();
+        let file = map.add("deck.cir", text);
+        let mut d = vec![];
+        let run = prepare(&mut map, file, &Overrides::default(), Some(pick), &mut d).unwrap();
+        let mut trace = run.trace();
+        run.go(&mut trace).unwrap();
+        assert_eq!((trace.names[0].as_str(), trace.rows()), (first, rows), "{d:?}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_said() {
+    for (card, code) in [
+        (".dc v1 0 1 1p", "E0789"),
+        (".dc nosuch 0 1 1", "E0784"),
+        (".dc v1 0 1 -1", "E0782"),
+        (".ac oct 3 0 10", "E0782"),
+        (".ac 10 1 100", "E0703"),
+        (".tf v(a) r1", "E0786"),
+        (".dc v1 0", "E0703"),
+        (".op\n.step r1 1 2 1p", "E0789"),
+        (".noise v(a) v1 dec 1 1 10", "E0702"),
+        (".pz a 0 a 0 vol pz", "E0702"),
+    ] {
+        assert!(errors(&format!("v1 a 0 1\nr1 a 0 1k\n{card}")).contains(&code), "{card}");
+    }
+}
