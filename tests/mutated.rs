@@ -142,7 +142,7 @@ fn run(name: &str, seeds: &[Vec<u8>], target: fn(&[u8])) {
         let bytes = mutate(seed, other, &mut random);
         let at = Instant::now();
         let outcome = std::panic::catch_unwind(|| target(&bytes));
-        if outcome.is_err() || at.elapsed() > Duration::from_secs(20) {
+        if outcome.is_err() || at.elapsed() > Duration::from_secs(120) {
             let path = std::env::temp_dir().join(format!("{name}.{start}"));
             std::fs::write(&path, &bytes).unwrap();
             panic!("{name}: {} after {tried} tries, {:?}", path.display(), at.elapsed());

@@ -250,7 +250,7 @@ pub const CODES: &[Code] = &[
     row("E0923", "JSON is no trace", "A trace in JSON is `{\"schema\": 1, \"names\": […], \"units\": […], \"columns\": [[…], …]}`, all columns of one length."),
     row("E0924", "trace has no rows", "There is a header, or nothing at all, and no row of numbers."),
     row("E0925", "two columns of one name", "Columns are told apart by their names. Give one of them another name with `as`."),
-    row("E0926", "time falls", "The first column of a trace must not decrease, and must hold numbers."),
+    row("E0926", "time falls", "The first column of a trace must not decrease, and must hold finite numbers."),
     row("E0930", "not a map of variables", "`bondspice convert --map` writes the map: JSON with `variables`, each with `bg`, `expr`, `factor` and `unit`."),
     row("E0932", "map does not fit the result", "None of the map's circuit variables has a column in the result. The map must be that of the netlist that was run."),
     row("E0933", "not a list of times", "A list of times has one time in seconds a line, rising from 0 on."),

@@ -125,7 +125,13 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Trace, Failed> {
         Some(format) => (format.read)(bytes),
         None => Err(bad("E0920", "not a trace")),
     };
-    let trace = trace.and_then(|trace| check(&trace).map(|()| trace));
+    let trace = trace.and_then(|mut trace| {
+        // A name that no table could hold.
+        for name in trace.names.iter_mut().filter(|name| name.contains(char::is_control)) {
+            *name = name.replace(char::is_control, "_");
+        }
+        check(&trace).map(|()| trace)
+    });
     trace.map_err(|mut diagnostic| {
         diagnostic.message = format!("`{name}`: {}", diagnostic.message);
         diagnostic
@@ -158,6 +164,9 @@ fn rises(trace: &Trace, at: usize, rows: Range<usize>) -> Result<(), Failed> {
     let sign = if sweep && last < first { -1.0 } else { 1.0 };
     let backwards = |row: &usize| {
         let before = if *row > rows.start { column[row - 1] } else { column[*row] };
+        if column[*row].is_infinite() {
+            return true;
+        }
         (sign * before).partial_cmp(&(sign * column[*row])).is_none_or(|order| order.is_gt())
     };
     let Some(row) = rows.clone().find(backwards) else { return Ok(()) };
@@ -239,6 +248,7 @@ pub(super) mod tests {
             (b"time,x\n1,1\n0,2\n", "E0926"),
             (b"time,x\nNaN,1\n0,2\n", "E0926"),
             (b"time,x\nNaN,1\n", "E0926"),
+            (b"time,x\n0,1\n1e999,2\n", "E0926"),
             (b"step,time,x\n1,1,1\n1,0,1\n", "E0926"),
             (b"step,time,x\n2,0,1\n1,0,1\n", "E0926"),
             (b"t x\n0 1\n1 one\n", "E0921"),

@@ -53,7 +53,8 @@ pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     Ok(Trace { names, units, columns })
 }
 
-/// Whether a file begins as a JSON object does.
+/// Whether a file begins as a JSON object does; the head of a table may begin with `{v(a)*2}`.
 pub fn recognises(bytes: &[u8]) -> bool {
-    bytes.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'{')
+    let mut solid = bytes.iter().filter(|byte| !byte.is_ascii_whitespace());
+    solid.next() == Some(&b'{') && matches!(solid.next(), Some(b'"' | b'}') | None)
 }

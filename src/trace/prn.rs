@@ -63,13 +63,25 @@ pub fn recognises(bytes: &[u8]) -> bool {
         }
         let numbers = line.split_whitespace().all(|word| value(word).is_some());
         if numbers {
-            return !line.trim().contains('\t') || begin.lines().next() == Some(line);
+            // A single column is as good a CSV file.
+            let nameless = begin.lines().next() == Some(line);
+            return line.split_whitespace().nth(1).is_some()
+                && (nameless || !line.trim().contains('\t'));
         }
-        if line.contains([',', ';']) && !line.contains('(') || line.contains('\t') {
+        if separates(line) || line.contains('\t') {
             return false;
         }
     }
     false
+}
+
+/// Whether a comma or semicolon stands outside of round brackets.
+fn separates(line: &str) -> bool {
+    let mut depth = 0_i32;
+    line.bytes().any(|byte| {
+        depth += i32::from(byte == b'(') - i32::from(byte == b')');
+        depth <= 0 && matches!(byte, b',' | b';')
+    })
 }
 
 fn is_comment(line: &str) -> bool {

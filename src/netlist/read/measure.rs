@@ -79,6 +79,10 @@ pub fn measure(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     }
     let name = word.0.to_string();
     let (form, from) = cursor.word();
+    if form.is_empty() {
+        reader.missing(cursor, "the form of the measure");
+        return None;
+    }
     let form = form.to_lowercase();
     if OTHERS.contains(&analysis.as_str()) || PASSED.contains(&form.as_str()) {
         let what = if PASSED.contains(&form.as_str()) { &form } else { &analysis };
@@ -114,7 +118,7 @@ pub fn measure(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
                 Kind::Formula(reader.grouped(cursor, from, from + text.len())?)
             }
             _ => {
-                let span = cursor.span(reader, from, from + form.len().max(1));
+                let span = cursor.span(reader, from, cursor.at);
                 let message = format!("`{form}` is no form of a measure");
                 let error = Diagnostic::error("E0816", span, message);
                 let known = FORMS.iter().copied().chain(STATISTICS.iter().map(|(word, _)| *word));
@@ -209,7 +213,7 @@ fn limits(reader: &mut Reader, cursor: &mut Cursor) -> Option<Limits> {
     let mut limits = Limits::default();
     while !cursor.is_done() {
         let mut ahead = *cursor;
-        let (word, from) = ahead.word();
+        let (word, _) = ahead.word();
         let key = word.to_lowercase();
         let place = match key.as_str() {
             "val" => &mut limits.level,
@@ -236,7 +240,8 @@ fn limits(reader: &mut Reader, cursor: &mut Cursor) -> Option<Limits> {
                 continue;
             }
             _ => {
-                let span = cursor.span(reader, from, from + word.len().max(1));
+                let span = cursor.here(reader);
+                let word = cursor.text[cursor.at..].split_whitespace().next().unwrap_or("");
                 let message = format!("`{word}` is no part of a measure");
                 reader.diagnostics.push(Diagnostic::error("E0816", span, message));
                 cursor.at = cursor.text.len();
