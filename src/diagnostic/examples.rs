@@ -242,6 +242,7 @@ macro_rules! beside {
 pub const BESIDE: &[(&str, &str)] = beside! {
     "with/divider.inc"
     "with/torn.csv"
+    "with/words.dat"
 };
 
 /// The name and the text of the file that explains a code.
