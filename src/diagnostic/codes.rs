@@ -211,10 +211,10 @@ pub const CODES: &[Code] = &[
     row("W0705", "guess at no node", "`.nodeset` names a node where no device stands. It is a hint for the operating point, so the run goes on without it."),
     row("W0730", "header line is not understood", "A comment `*bondspice key=value` is malformed and has no effect. The keys stand in the header of `netlist/header.rs`."),
     row("W0731", "node is named only once", "Nothing else stands at the node, and nothing reads it: mostly a slip of the pen, and the current into it is 0."),
-    row("N0719", "dialect guessed", "Nobody said what simulator the netlist is written for, and a line of it is understood by one alone, so it is read as that one reads it: suffixes, functions, signs and names differ. `--dialect` says it."),
     row("W0790", "measure is not taken", "Measures of `noise`, `fft` and `op`, and the forms DUTY, FREQ, ON_TIME, OFF_TIME and ERROR, are not computed. The run goes on without them."),
     row("W0791", "measure failed", "The run holds no such event, or none that often; or the window lies outside of it; or a measure that this one uses has failed. Its value is written as `failed`, and as no number in files."),
     row("W0792", "measure of another analysis", "The measure is taken from the rows of an analysis that is not the one run. `--analysis` picks that."),
+    row("N0719", "dialect guessed", "Nobody said what simulator the netlist is written for, and a line of it is understood by one alone, so it is read as that one reads it: suffixes, functions, signs and names differ. `--dialect` says it."),
     // -- 08: simulation
     row("E0801", "no operating point or start", "Newton's method found no values that satisfy all equations, neither directly, nor with conductances at the nodes that are taken away step by step, nor with sources turned up step by step. The message names the equation that is satisfied worst."),
     row("E0802", "step too small", "The step became smaller than rounding allows without reaching the tolerance. A law may have a jump or a pole there, or the solution ends. The message names the equation that is satisfied worst, and why steps were cut."),
