@@ -193,6 +193,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0806" "no_end.bg"
     "E0807" "option_value.bg"
     "E0810" "step_with_other_columns.cir"
+    "E0811" "samples_in_ac.cir"
     "E0816" "measure_of_no_form.cir"
     "E0817" "measures_of_one_name.cir"
     "E0818" "measure_before_its_source.cir"

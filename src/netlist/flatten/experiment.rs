@@ -104,7 +104,7 @@ pub fn readings(
     // The items of the analysis that is run; where none are, those of any other.
     let own = last.map(print_of);
     let said = prints().any(|of| of == Print::Any || Some(of) == own);
-    let wanted = |of: Print| !said || of == Print::Any || Some(of) == own;
+    let wanted = |of: Print| !said || own.is_none() || of == Print::Any || Some(of) == own;
     let mut seen = HashSet::new();
     for card in &flat.live {
         let CardKind::Save { of, items } = &card.kind else { continue };

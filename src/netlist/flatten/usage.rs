@@ -125,7 +125,13 @@ impl Usage {
                 CardKind::Global(nodes) => {
                     nodes.iter().chain(nodes).for_each(|node| self.count(*node));
                 }
-                CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| self.expr(expr)),
+                CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| {
+                    // A bare word is a node.
+                    if let crate::expr::Node::Leaf(Leaf::Parameter(name)) = &*expr.node {
+                        self.count(*name);
+                    }
+                    self.expr(expr);
+                }),
                 CardKind::Measure(measure) => {
                     read::measure::expressions(&measure.kind, &mut |expr| self.expr(expr));
                 }

@@ -269,7 +269,7 @@ fn errors_have_codes_and_places() {
         ("v1 a 0 PWL(0 1) rr=0", "E0704", "rr"),
         ("e1 a 0 poly(0) b 0 1 2", "E0771", "poly(0"),
         ("b1 a 0 2*v(c)", "E0703", "2*v"),
-        (".ac dec 10 1 1k", "E0702", ".ac"),
+        (".noise v(a) v1 dec 10 1 1k", "E0702", ".noise"),
         (".include x.lib", "E0901", "x.lib"),
         (".trann 1 2", "E0701", ".trann"),
         (".tran 1", "E0703", "1"),
