@@ -172,3 +172,38 @@ fn forms_of_others() {
     close("m4", 2.0, 1e-9);
     close("m5", 1e-3, 1e-6);
 }
+
+/// One row a step, with the limits of each step's own parameters, also where rows stand on a grid; sweeps and phasors.
+#[test]
+fn steps_sweeps_and_phasors() {
+    let text = "charging\n.param half=0.5 r=1k\n.options reltol=1e-6\nVs in 0 1\nR1 in out {r}\nC1 out 0 1u IC=0\n\
+                .tran 10u 5m UIC\n.step param half list 0.25 0.5 0.75\n\
+                .meas ac other MAX v(out)\n.meas tran t WHEN v(out)='half'\n.meas tran more PARAM='2*t'\n\
+                .print tran v(out)\n.end\n";
+    for flags in [&[][..], &["--step", "1ms"]] {
+        let (found, said) = measures(text, flags);
+        assert_eq!(found["step"], [0.0, 1.0, 2.0]);
+        for (at, part) in [0.25_f64, 0.5, 0.75].into_iter().enumerate() {
+            let wanted = -1e-3 * (1.0 - part).ln();
+            assert!((found["t"][at] / wanted - 1.0).abs() < 1e-5, "{at}: {:?}", found["t"]);
+            assert!((found["more"][at] / wanted - 2.0).abs() < 1e-5, "{:?}", found["more"]);
+        }
+        assert!(said.contains("step") && said.contains("W0792"), "{said}");
+    }
+    let low = "low pass\nVs in 0 DC 0 AC 1\nR1 in out 1k\nC1 out 0 1u\n.ac dec 100 1 100k\n\
+               .meas ac corner WHEN vdb(out)=-3.0102999566398 CROSS=1\n.meas ac top MAX v(out)\n\
+               .print ac v(out)\n.end\n";
+    let corner = 1e3 / (2.0 * PI);
+    // Also where every voltage and current is written.
+    for text in [low.to_string(), low.replace(".print ac v(out)\n", "")] {
+        let (found, _) = measures(&text, &[]);
+        // Lines between 100 points a decade.
+        assert!((found["corner"][0] / corner - 1.0).abs() < 1e-3, "{:?}", found["corner"]);
+        assert!((found["top"][0] - 1.0).abs() < 1e-4, "{:?}", found["top"]);
+    }
+    let divider = "divider\nV1 in 0 0\nR1 in out 1k\nR2 out 0 3k\n.dc V1 0 10 0.5\n\
+                   .meas dc where WHEN v(out)=3\n.meas dc mean AVG v(out)\n.print dc v(out)\n.end\n";
+    let (found, _) = measures(divider, &[]);
+    assert!((found["where"][0] - 4.0).abs() < 1e-9, "{:?}", found["where"]);
+    assert!((found["mean"][0] - 3.75).abs() < 1e-9, "{:?}", found["mean"]);
+}

@@ -3,6 +3,7 @@
 use super::devices::{self, Branch};
 use super::stamps::{
     Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
+    watched_name,
 };
 use super::{
     Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
@@ -194,8 +195,7 @@ impl<'a> Stamper<'a> {
                 .collect()
         };
         let watched = self.circuit.watched.iter().enumerate();
-        let watched: Vec<_> =
-            watched.map(|(k, expr)| (format!("measured {}", k + 1), self.law(expr))).collect();
+        let watched: Vec<_> = watched.map(|(k, expr)| (watched_name(k), self.law(expr))).collect();
         self.stamps.watched = watched.len();
         self.stamps.outputs.extend(watched);
         let of_nodes = |values: &[(NodeId, f64)]| {

@@ -30,6 +30,11 @@ pub fn stamp(circuit: &Circuit, diagnostics: &mut Vec<Diagnostic>) -> Option<Sta
     (!crate::diagnostic::has_errors(&diagnostics[before..])).then_some(stamps)
 }
 
+/// What a column is called that is measured and not written.
+pub fn watched_name(place: usize) -> String {
+    format!("measured {}", place + 1)
+}
+
 /// Index of an unknown and of its equation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct UnknownId(pub u32);

@@ -22,7 +22,8 @@ pub struct Measured {
 /// A sink before another that takes measures from the columns which are not written.
 pub struct Measuring<'a> {
     to: &'a mut dyn Sink,
-    list: &'a [Measure],
+    list: Vec<Measure>,
+    analysis: &'a str,
     /// Columns that are written, those before them included.
     shown: usize,
     /// Where the abscissa stands: after the step, where there are steps.
@@ -48,7 +49,8 @@ impl<'a> Measuring<'a> {
     /// Before a sink; `names` are those of all columns, `times` says whether rows stand at times of their own.
     pub fn new(
         to: &'a mut dyn Sink,
-        list: &'a [Measure],
+        list: &[Measure],
+        analysis: &'a str,
         names: &[String],
         times: bool,
     ) -> Measuring<'a> {
@@ -61,15 +63,21 @@ impl<'a> Measuring<'a> {
             at += 1 + usize::from(pair);
         }
         let abscissa = usize::from(names.first().is_some_and(|name| name == STEP));
-        let (taking, values, done) = (None, vec![], vec![]);
-        Measuring { to, list, shown, abscissa, watched, times, taking, values, done }
+        let (list, taking, values, done) = (list.to_vec(), None, vec![], vec![]);
+        Measuring { to, list, analysis, shown, abscissa, watched, times, taking, values, done }
+    }
+
+    /// Takes these measures from the next step on, whose parameters have other values.
+    pub fn follow(&mut self, list: &[Measure]) {
+        self.end();
+        self.list = list.to_vec();
     }
 
     fn measure(&mut self, row: &[f64]) {
         let step = if self.abscissa > 0 { row[0] } else { 0.0 };
         if self.taking.as_ref().is_none_or(|(own, _)| *own != step) {
             self.end();
-            self.taking = Some((step, Measures::new(self.list)));
+            self.taking = Some((step, Measures::new(&self.list, self.analysis)));
         }
         self.values.clear();
         // A phasor counts by its magnitude.

@@ -10,7 +10,6 @@ use crate::quantity::nearest;
 use crate::sim::analyses::{self, ANALYSES, Job};
 use crate::sim::{self, Failure, FailureKind, Interval, Progress, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
-use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -35,8 +34,6 @@ pub struct Run {
     pub analysis: Analysis,
     /// Everything is run at each of these values.
     pub steps: Vec<Axis>,
-    /// What is measured in it.
-    pub measures: Vec<Measure>,
     /// Headers of all columns, those that are only measured included.
     all: Vec<String>,
     circuit: Circuit,
@@ -169,18 +166,12 @@ pub fn ready(
         return None;
     }
     let own = analysis.name();
-    let (measures, others): (Vec<_>, Vec<_>) = circuit
-        .measures
-        .iter()
-        .cloned()
-        .partition(|measure| measure.analysis.is_empty() || measure.analysis == own);
-    if let Some(other) = others.first() {
+    if let Some(other) = circuit.measures.iter().find(|measure| !measure.is_of(own)) {
         let message = format!("measures of `{}` are not taken: `{own}` is run", other.analysis);
         let warning = Diagnostic::warning("W0792", other.span, message);
         d.push(warning.help("pick the analysis with --analysis"));
     }
     Some(Run {
-        measures,
         all,
         title: circuit.title.clone(),
         names,
@@ -238,12 +229,13 @@ impl Run {
     /// Runs, and sends rows to a sink; also tells what was measured.
     pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
         let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
-        let mut measuring = Measuring::new(sink, &self.measures, &self.all, times);
+        let own = self.analysis.name();
+        let mut measuring = Measuring::new(sink, &self.circuit.measures, own, &self.all, times);
         let result = self.analyse(&mut measuring);
         (result, measuring.finish())
     }
 
-    fn analyse(&self, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
+    fn analyse(&self, sink: &mut Measuring) -> Result<Statistics, Failure> {
         if self.steps.is_empty() {
             let settings = self.settings.as_ref().unwrap_or(&self.still);
             return self.one(&self.circuit, &self.stamps, &self.system, settings, &[], sink);
@@ -266,11 +258,11 @@ impl Run {
         &self,
         step: u64,
         pairs: &[(&str, f64)],
-        sink: &mut dyn Sink,
+        to: &mut Measuring,
     ) -> Result<Statistics, Failure> {
-        let mut sink = Stepped { to: sink, row: vec![step as f64] };
         let base = self.settings.as_ref().unwrap_or(&self.still);
         if step == 0 {
+            let mut sink = Stepped { to, row: vec![step as f64] };
             return self.one(&self.circuit, &self.stamps, &self.system, base, pairs, &mut sink);
         }
         let circuit = self.vary(pairs).map_err(input)?;
@@ -289,6 +281,8 @@ impl Run {
             let Settings { rows, interrupt, progress, .. } = settings;
             settings = Settings { rows, interrupt, progress, ..own };
         }
+        to.follow(&circuit.measures);
+        let mut sink = Stepped { to, row: vec![step as f64] };
         self.one(&circuit, &stamps, &system, &settings, pairs, &mut sink)
     }
 
@@ -353,11 +347,22 @@ struct Stepped<'a> {
     row: Vec<f64>,
 }
 
-impl Sink for Stepped<'_> {
-    fn row(&mut self, values: &[f64]) -> std::io::Result<()> {
+impl Stepped<'_> {
+    fn number(&mut self, values: &[f64]) {
         self.row.truncate(1);
         self.row.extend_from_slice(values);
+    }
+}
+
+impl Sink for Stepped<'_> {
+    fn row(&mut self, values: &[f64]) -> std::io::Result<()> {
+        self.number(values);
         self.to.row(&self.row)
+    }
+
+    fn step(&mut self, values: &[f64]) -> std::io::Result<()> {
+        self.number(values);
+        self.to.step(&self.row)
     }
 }
 

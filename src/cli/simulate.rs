@@ -136,7 +136,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
         Ok(statistics) => {
             session.say(statistics.warnings.clone());
             output.to.close(true, session)?;
-            let name = if run.settings.is_some() { "tran" } else { "op" };
+            let name = run.analysis.name();
             measures::tell(&measured, name, arguments.measures.as_deref(), session)?;
             say_statistics(arguments, &statistics, session);
             Ok(session.exit())

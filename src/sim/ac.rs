@@ -7,7 +7,7 @@ use super::linearise::{Linear, Pencil, singular};
 use super::phasor;
 use super::statistics::Statistics;
 use super::system::System;
-use crate::circuit::stamps::{self, Stamps};
+use crate::circuit::stamps::{self, Stamps, watched_name};
 use crate::circuit::{Analysis, Circuit, Expr, Leaf, Output, Points, Probe};
 use crate::linear::Complex;
 use crate::trace::Sink;
@@ -15,15 +15,24 @@ use std::f64::consts::TAU;
 
 /// Columns: two for a phasor, one for a part of one.
 pub(super) fn columns(circuit: &Circuit, stamps: &Stamps) -> Vec<Column> {
-    let first = [("frequency".to_string(), "Hz")].into_iter();
-    if circuit.outputs.is_empty() {
-        return first.chain(stamps.outputs.iter().flat_map(|(name, _)| both(name))).collect();
-    }
+    let mut columns = vec![("frequency".to_string(), "Hz")];
     let of = |output: &Output| match phasor::is_complex(&output.expr) {
         true => both(&output.name).to_vec(),
         false => vec![(output.name.clone(), phasor::unit(&output.expr))],
     };
-    first.chain(circuit.outputs.iter().flat_map(of)).collect()
+    if circuit.outputs.is_empty() {
+        let written = &stamps.outputs[..stamps.outputs.len() - stamps.watched];
+        columns.extend(written.iter().flat_map(|(name, _)| both(name)));
+    }
+    columns.extend(circuit.outputs.iter().chain(&watched(circuit)).flat_map(of));
+    columns
+}
+
+/// What is measured and not written, as outputs.
+fn watched(circuit: &Circuit) -> Vec<Output> {
+    let watched = circuit.watched.iter().enumerate();
+    let named = |(k, expr): (usize, &Expr)| Output { name: watched_name(k), expr: expr.clone() };
+    watched.map(named).collect()
 }
 
 /// The columns of a phasor.
@@ -66,7 +75,7 @@ impl Probed {
             .iter()
             .enumerate()
             .map(|(k, probe)| Output { name: k.to_string(), expr: Expr::leaf(leaf(probe)) });
-        let circuit = Circuit { outputs: read.collect(), ..circuit.clone() };
+        let circuit = Circuit { outputs: read.collect(), watched: vec![], ..circuit.clone() };
         let mut d = vec![];
         let stamps = stamps::stamp(&circuit, &mut d);
         let system = stamps.and_then(|stamps| compile_linear(&stamps, &mut d));
@@ -101,7 +110,12 @@ impl Probed {
 /// Runs over the frequencies.
 pub(super) fn ac(job: &Job, sink: &mut dyn Sink) -> Result<Statistics, Failure> {
     let Analysis::Ac { frequencies } = job.analysis else { return Ok(Statistics::default()) };
-    let probed = Probed::of(job.circuit, &job.circuit.outputs)?;
+    let watched = watched(job.circuit);
+    // Where everything is written, what is measured is read apart.
+    let apart = job.circuit.outputs.is_empty() && !watched.is_empty();
+    let written = job.circuit.outputs.iter().chain(watched.iter().filter(|_| !apart));
+    let probed = Probed::of(job.circuit, &written.cloned().collect::<Vec<_>>())?;
+    let measured = if apart { Some(Probed::of(job.circuit, &watched)?) } else { None };
     let mut pencil = Pencil::new(&probed.linear, false);
     let phasors = probed.linear.phasors();
     let mut statistics = probed.linear.statistics.clone();
@@ -117,6 +131,10 @@ pub(super) fn ac(job: &Job, sink: &mut dyn Sink) -> Result<Statistics, Failure> 
         row.clear();
         row.push(frequency);
         probed.row(s, &x, &mut row);
+        // Both have the same unknowns.
+        if let Some(measured) = &measured {
+            measured.row(s, &x, &mut row);
+        }
         statistics.rows += 1;
         sink.row(&row).map_err(|error| unwritten(&error, &statistics))?;
         if let Some(failure) = interrupted(job, &statistics) {

@@ -11,13 +11,10 @@
 
 use super::{Cursor, Reader};
 use crate::diagnostic::Diagnostic;
-use crate::expr::Binary;
+use crate::expr::{Binary, Node};
 use crate::netlist::{CardKind, Expr, Leaf, Measure, MeasureKind};
 use crate::quantity::nearest;
-use crate::trace::measure::{Edge, Event, Kind, Statistic, Which, Window};
-
-/// Analyses whose rows are measured.
-const ANALYSES: &[&str] = &["tran", "ac", "dc"];
+use crate::trace::measure::{ANALYSES, Edge, Event, Kind, Statistic, Which, Window};
 
 /// Those that others measure too.
 const OTHERS: &[&str] =
@@ -177,7 +174,11 @@ fn item(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
         None if text.contains('#') || text.starts_with('@') => {
             super::cards::item(reader, cursor, from, to).map(|(_, expr)| expr)
         }
-        None => reader.grouped(cursor, from, to),
+        // `vdb(out)`, `p(r1)`.
+        None => match super::analyses::reading(reader, text) {
+            Some(leaf) => Some(Expr::new(Node::Leaf(leaf), cursor.span(reader, from, to))),
+            None => reader.grouped(cursor, from, to),
+        },
     }
 }
 

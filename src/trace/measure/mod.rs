@@ -43,6 +43,17 @@ pub struct Measure {
     pub kind: Kind,
 }
 
+/// Analyses whose rows are measured.
+pub const ANALYSES: &[&str] = &["tran", "ac", "dc"];
+
+impl Measure {
+    /// Whether it is taken from the rows of an analysis.
+    pub fn is_of(&self, analysis: &str) -> bool {
+        let any = self.analysis.is_empty() && ANALYSES.contains(&analysis);
+        any || self.analysis == analysis
+    }
+}
+
 /// The forms of measures, over columns (here, indices of the watched ones) and values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind<C = usize, V = Value> {
@@ -116,6 +127,7 @@ impl Kind {
 /// Takes measures from rows.
 pub struct Measures {
     list: Vec<Measure>,
+    analysis: String,
     taking: Vec<Option<Taking>>,
     /// Rows for those that wait, one after the other, the abscissa first.
     kept: Option<Vec<f64>>,
@@ -143,16 +155,19 @@ enum Taking {
 }
 
 impl Measures {
-    /// Ready for the rows of a run.
-    pub fn new(list: &[Measure]) -> Measures {
+    /// Ready for the rows of a run of an analysis; measures of others are left out.
+    pub fn new(list: &[Measure], analysis: &str) -> Measures {
         let nothing = |_: &Source| f64::NAN;
         let begin = |measure: &Measure| {
-            (!measure.kind.waits()).then(|| Taking::new(&measure.kind, &nothing))
+            let now = measure.is_of(analysis) && !measure.kind.waits();
+            now.then(|| Taking::new(&measure.kind, &nothing))
         };
-        let kept = list.iter().any(|measure| measure.kind.waits()).then(Vec::new);
+        let waits = |measure: &Measure| measure.is_of(analysis) && measure.kind.waits();
+        let kept = list.iter().any(waits).then(Vec::new);
         Measures {
             taking: list.iter().map(begin).collect(),
             list: list.to_vec(),
+            analysis: analysis.to_string(),
             kept,
             last: Row::default(),
             before: Row::default(),
@@ -190,10 +205,14 @@ impl Measures {
 
     /// The results, in the order of the cards.
     pub fn finish(self) -> Vec<Outcome> {
-        let Measures { list, taking, kept, last, rows, .. } = self;
+        let Measures { list, analysis, taking, kept, last, rows, .. } = self;
         let mut results: Vec<Option<f64>> = vec![];
         let mut outcomes = vec![];
         for (measure, taking) in list.iter().zip(taking) {
+            if !measure.is_of(&analysis) {
+                results.push(None);
+                continue;
+            }
             let source = |source: &Source| match source {
                 Source::Measure(at) => results.get(*at).copied().flatten().unwrap_or(f64::NAN),
                 Source::Column(at) => last.values.get(*at).copied().unwrap_or(f64::NAN),
@@ -233,7 +252,7 @@ fn again(measure: &Measure, source: &dyn Fn(&Source) -> f64, kept: &[f64], last:
     let mut fixed = |value: &Value| Some(Value::number(value.evaluate(&mut |s| source(s))));
     let kind = measure.kind.try_map(&mut |column| Some(*column), &mut fixed);
     let alone = Measure { kind: kind.ok_or("it has no value")?, ..measure.clone() };
-    let mut measures = Measures::new(std::slice::from_ref(&alone));
+    let mut measures = Measures::new(std::slice::from_ref(&alone), &alone.analysis);
     for row in kept.chunks_exact(last.values.len() + 1) {
         measures.row(row[0], &row[1..]);
     }

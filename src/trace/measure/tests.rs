@@ -24,7 +24,7 @@ fn measured(kinds: Vec<Kind>) -> Vec<Outcome> {
         kind,
     };
     let list: Vec<Measure> = kinds.into_iter().enumerate().map(measure).collect();
-    let mut measures = Measures::new(&list);
+    let mut measures = Measures::new(&list, "tran");
     let rows = 10_000;
     for row in 0..=rows {
         let x = 4.0 * std::f64::consts::PI * f64::from(row) / f64::from(rows);
@@ -135,7 +135,7 @@ fn jumps_and_falling_sweeps() {
     .map(|kind| Measure { name: String::new(), span: Span::NONE, analysis: String::new(), kind })
     .collect();
     let run = |rows: &[(f64, f64)]| -> Vec<Option<f64>> {
-        let mut measures = Measures::new(&list);
+        let mut measures = Measures::new(&list, "tran");
         rows.iter().for_each(|(x, y)| measures.row(*x, &[*y]));
         measures.finish().into_iter().map(|outcome| outcome.value).collect()
     };
