@@ -3,18 +3,16 @@
 
 use super::exact::bonds::Place;
 use super::exact::draw::mix;
-use super::exact::text::{Start, Text, waveform_of};
+use super::exact::text::{Seen, Start, Text, seen, waveform_of};
 use super::report::{Mismatch, Values};
 use crate::bond::equations::{Known, equations};
 use crate::bond::graph::{BondGraph, Expr, Leaf, Memory, SignalId, SignalLaw};
 use crate::bond::initial::InitialState;
 use crate::circuit::{DeviceKind, NodeId, Waveform};
-use crate::netlist::dialects::NGSPICE;
 use crate::netlist::flatten::scope::{self, TOP};
+use crate::netlist::flatten::values::Lookup;
 use crate::netlist::header::Header;
-use crate::netlist::read::expression::expression;
 use crate::netlist::{self, CardKind, Element, Netlist, Shape};
-use crate::source::FileId;
 use std::collections::HashSet;
 
 /// Values that differ by less are equal.
@@ -370,8 +368,8 @@ impl Check<'_> {
     /// Everything that a column reads is saved and printed.
     fn saved(&mut self) {
         let text = self.text;
-        let mut names = text.names.clone();
-        let mut items: [Vec<netlist::Leaf>; 2] = [vec![], vec![]];
+        let lookup = Lookup::new(&text.flat, &text.names);
+        let mut items: [Vec<Seen>; 2] = [vec![], vec![]];
         let mut all = [false; 2];
         for card in &text.netlist.cards {
             let CardKind::Save { of, items: given } = &card.kind else { continue };
@@ -379,33 +377,24 @@ impl Check<'_> {
             all[print] |= given.is_empty();
             for (_, expr) in given {
                 if let crate::expr::Node::Leaf(leaf) = &*expr.node {
-                    items[print].push(leaf.clone());
+                    items[print].extend(seen(&lookup, leaf));
                 }
             }
         }
         let mut told = HashSet::new();
-        for column in &text.header.columns {
-            let read =
-                expression(&column.expr, &mut names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
+        for (column, read) in text.header.columns.iter().zip(&text.columns) {
             let Some(read) = read else { continue };
             let mut wanted = vec![];
-            read.leaves(&mut |leaf, _| match leaf {
-                netlist::Leaf::Voltage(a, b) => wanted.extend(
-                    std::iter::once(*a).chain(*b).map(|node| netlist::Leaf::Voltage(node, None)),
-                ),
-                netlist::Leaf::Current(_) => wanted.push(leaf.clone()),
-                _ => {}
-            });
+            read.leaves(&mut |leaf, _| wanted.extend(seen(&lookup, leaf)));
             let dialect = text.netlist.dialect;
-            for leaf in wanted {
+            for item in wanted {
                 // Some simulators save everything, and some print from what they have saved.
                 let asked = [(0, ".save", dialect.save), (1, ".print", dialect.print)];
                 for (print, card, _) in asked.into_iter().filter(|(.., word)| !word.is_empty()) {
-                    let ground = matches!(leaf, netlist::Leaf::Voltage(node, None)
-                        if names.text(node) == "0");
-                    let there = all[print] || ground || items[print].contains(&leaf);
+                    let ground = item == Seen::Node(NodeId(0));
+                    let there = all[print] || ground || items[print].contains(&item);
                     self.compared += 1;
-                    if !there && told.insert((card, format!("{leaf:?}"))) {
+                    if !there && told.insert((card, item)) {
                         self.wrong(card, format!("it leaves out what `{}` reads", column.name));
                     }
                 }

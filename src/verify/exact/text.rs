@@ -2,13 +2,16 @@
 
 use super::bonds::{Place, constant_inertias};
 use crate::bond::graph::{BondGraph, End, Law, SignalId, SignalLaw, SignalOrigin, StoreLaw};
-use crate::circuit::{Circuit, DeviceKind, NodeId};
+use crate::circuit::{Circuit, DeviceId, DeviceKind, NodeId};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::dialects::NGSPICE;
 use crate::netlist::flatten::expand::{Flat, Pending, expand};
 use crate::netlist::flatten::scope::{ScopeId, TOP};
 use crate::netlist::flatten::values::Lookup;
 use crate::netlist::header::Header;
+use crate::netlist::read::expression::expression;
 use crate::netlist::{Element, Expr, Leaf, Name, Names, Netlist, flatten};
+use crate::source::{FileId, Span};
 use crate::translate::Map;
 use std::collections::HashMap;
 
@@ -24,6 +27,8 @@ pub struct Text<'n> {
     pub circuit: Circuit,
     /// Its header.
     pub header: Header,
+    /// By column of the header: its expression, where every name leads to something.
+    pub columns: Vec<Option<Expr>>,
     /// By device: what it claims to stand for.
     pub claims: Vec<Option<Place>>,
     /// By place: its devices.
@@ -90,9 +95,19 @@ impl<'n> Text<'n> {
                 known.intern(names.text(path));
             }
         }
+        // The header speaks as ngspice does whatever the dialect, and so of names that no card has.
+        let columns: Vec<_> = header
+            .columns
+            .iter()
+            .map(|c| expression(&c.expr, &mut known, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]))
+            .collect();
         let lookup = Lookup::new(&flat, &known);
+        let columns = columns
+            .into_iter()
+            .map(|column| column.filter(|expr| leads_somewhere(&lookup, expr)))
+            .collect();
         let find = |name: Name| known.find(names.text(name));
-        let none = crate::source::Span::NONE;
+        let none = Span::NONE;
         let node = |name: Name| {
             let found = find(name)?;
             let path = known.text(found).contains('.');
@@ -158,6 +173,7 @@ impl<'n> Text<'n> {
             netlist,
             circuit,
             header,
+            columns,
             claims,
             devices,
             variables,
@@ -270,6 +286,50 @@ impl<'n> Text<'n> {
     /// The name of a node.
     pub fn node_name(&self, node: NodeId) -> &str {
         self.circuit.nodes.get(node.0 as usize).map_or("", |node| node.name.as_str())
+    }
+}
+
+/// Whether every name of an expression is that of something in the text.
+fn leads_somewhere(lookup: &Lookup, expr: &Expr) -> bool {
+    let mut all = true;
+    expr.leaves(&mut |leaf, span| {
+        let mut unknown = vec![];
+        let node = |name: Name, d: &mut Vec<_>| lookup.node(TOP, name, span, d).is_some();
+        all &= match leaf {
+            Leaf::Voltage(a, b) => {
+                node(*a, &mut unknown) && b.is_none_or(|b| node(b, &mut unknown))
+            }
+            Leaf::Current(name) => lookup.device(TOP, *name, span, &mut unknown).is_some(),
+            // One that is not there has no value, which is found when it is asked for.
+            Leaf::Parameter(_) | Leaf::Time => true,
+            Leaf::Operator(..) | Leaf::Power(_) | Leaf::Part(..) => false,
+        };
+    });
+    all
+}
+
+/// What a name that is read or saved leads to, however it is spelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Seen {
+    /// A node.
+    Node(NodeId),
+    /// A device.
+    Device(DeviceId),
+}
+
+/// What a voltage or a current is taken from.
+pub fn seen(lookup: &Lookup, leaf: &Leaf) -> Vec<Seen> {
+    let (span, mut unknown) = (Span::NONE, vec![]);
+    match leaf {
+        Leaf::Voltage(a, b) => std::iter::once(*a)
+            .chain(*b)
+            .filter_map(|name| lookup.node(TOP, name, span, &mut unknown).map(Seen::Node))
+            .collect(),
+        Leaf::Current(name) => {
+            let device = lookup.device(TOP, *name, span, &mut unknown);
+            device.map(Seen::Device).into_iter().collect()
+        }
+        _ => vec![],
     }
 }
 
