@@ -34,6 +34,8 @@ pub enum Leaf {
     Current(DeviceId),
     /// A part of a phasor; elsewhere of a real number.
     Part(Part, Probe),
+    /// The capacitance in F of a device's stored charge: dq/dv.
+    Capacitance(DeviceId),
     /// Time in seconds.
     Time,
 }

@@ -9,7 +9,7 @@ use super::{
     Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
 };
 use crate::diagnostic::Diagnostic;
-use crate::expr::{self, Binary, Function};
+use crate::expr::{self, Binary, Function, slope::slope};
 
 /// A circuit on its way to its stamps.
 pub struct Stamper<'a> {
@@ -378,10 +378,27 @@ impl<'a> Stamper<'a> {
                 super::Leaf::Voltage(a, b) => voltage([self.node(*a), self.node(*b)]),
                 super::Leaf::Current(id) => self.current(*id).law(),
                 super::Leaf::Time => Law::leaf(Leaf::Time),
+                super::Leaf::Capacitance(id) => self.capacitance(*id),
                 super::Leaf::Part(part, probe) => part_of_real(*part, self.probe(*probe)),
             };
             Law { span, ..law }
         })
+    }
+
+    /// dq/dv of the charge of a device with a junction; 0 where it stores none.
+    fn capacitance(&self, id: DeviceId) -> Law {
+        let stored = self.charge(id).and_then(|charge| self.stamps.charges.get(charge as usize));
+        let Some(law) = stored.and_then(|charge| charge.law.as_ref()) else {
+            return Law::number(0.0);
+        };
+        let [anode, cathode] = self.ends(id);
+        // The law is of v(a) − v(b): of either end the slope is the same but for its sign.
+        let (by, sign) = match (self.internal(id).or(anode), cathode) {
+            (Some(plus), _) => (plus, 1.0),
+            (None, Some(minus)) => (minus, -1.0),
+            (None, None) => return Law::number(f64::NAN),
+        };
+        slope(law, &mut |leaf| if *leaf == Leaf::Unknown(by) { sign } else { 0.0 })
     }
 
     /// A voltage or current as a law over unknowns.

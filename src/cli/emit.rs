@@ -200,6 +200,7 @@ pub fn circuit(circuit: &Circuit) -> String {
             circuit::Leaf::Voltage(a, b) => format!("v({}, {})", node(*a), node(*b)),
             circuit::Leaf::Current(id) => format!("i({})", device(*id)),
             circuit::Leaf::Time => "time".into(),
+            circuit::Leaf::Capacitance(id) => format!("n({}:cd)", device(*id)),
             circuit::Leaf::Part(part, Probe::Voltage(a, b)) => {
                 format!("{}(v({}, {}))", part.name(), node(*a), node(*b))
             }

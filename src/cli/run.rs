@@ -155,6 +155,12 @@ pub fn ready(
             (name, unit)
         })
         .unzip();
+    // An item may be what is swept, too.
+    let leading = names.len().saturating_sub(circuit.outputs.len());
+    let (swept, items) = names.split_at_mut(leading);
+    for item in items.iter_mut().filter(|item| swept.contains(item)) {
+        *item = format!("{{{item}}}");
+    }
     let all = names.clone();
     names.truncate(measures::shown(&all));
     units.truncate(names.len());

@@ -61,6 +61,10 @@ pub struct Reading {
     pub colons: bool,
     /// Whether `ic=` of a device holds in the operating point, too.
     pub initial_holds: bool,
+    /// Whether a row at a jump holds what the step that ends there arrives at.
+    pub arrives: bool,
+    /// Whether a parameter of an X card wins over a `.param` of its name within the subcircuit.
+    pub instance_wins: bool,
 }
 
 /// What numbers may end with.
@@ -125,6 +129,8 @@ pub const NGSPICE: Dialect = Dialect {
         grounds: &["0", "gnd"],
         colons: false,
         initial_holds: false,
+        arrives: false,
+        instance_wins: false,
     }),
 };
 
@@ -167,6 +173,8 @@ pub const DIALECTS: &[Dialect] = &[
             grounds: &["0"],
             colons: true,
             initial_holds: true,
+            arrives: true,
+            instance_wins: true,
         }),
         ..NGSPICE
     },

@@ -37,6 +37,15 @@ impl PassiveKind {
             PassiveKind::Inductor => "l",
         }
     }
+
+    /// The keys that its value is named by.
+    pub fn keys(self) -> &'static [&'static str] {
+        match self {
+            PassiveKind::Resistor => &["r", "resistance"],
+            PassiveKind::Capacitor => &["c", "capacitance"],
+            PassiveKind::Inductor => &["l", "inductance"],
+        }
+    }
 }
 
 /// What makes a value of others over time.

@@ -11,6 +11,7 @@ mod conditions;
 mod dc;
 mod events;
 mod explain;
+mod inside;
 mod laws;
 mod linearise;
 mod memory;

@@ -243,6 +243,23 @@ impl<'a> Network<'a> {
         limited
     }
 
+    /// Puts 0 in the place of all values and derivatives of the last linearisation that are no finite numbers; says whether
+    /// a value was none.
+    pub fn silence(&mut self) -> bool {
+        let mut any = false;
+        for state in &mut self.groups {
+            for value in state.values.iter_mut().filter(|value| !value.is_finite()) {
+                *value = 0.0;
+                any = true;
+            }
+        }
+        if any {
+            let partials = self.groups.iter_mut().flat_map(|state| &mut state.partials);
+            partials.filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
+        }
+        any
+    }
+
     /// Lets the next limiting start from the junction voltages at `x`.
     pub fn remember_junctions(&mut self, x: &[f64]) {
         for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {

@@ -249,9 +249,15 @@ pub(crate) fn solve_frozen(
     let mut step = 1.0;
     for iteration in 0..frozen.most {
         network.statistics.iterations += 1;
-        let limited = network.linearise(x, frozen.t, true) || (frozen.prime && iteration == 0);
+        let mut limited = network.linearise(x, frozen.t, true) || (frozen.prime && iteration == 0);
         network.charges(x, q);
         frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+        if iteration == 0 && network.silence() {
+            // A law may have no value at the guess, and one where the others lead to: `acosh` of a voltage still at 0.
+            limited = true;
+            network.charges(x, q);
+            frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
+        }
         if scratch.residual.iter().any(|r| !r.is_finite()) {
             // Back half of the last step: the law is not defined where it led.
             if iteration == 0 || step < 1e-3 {

@@ -1,19 +1,16 @@
 //! Rows of the trace: when they are due, and their values from the charges of a step.
 //!
-//! Only charges are interpolated; the unknowns follow from the frozen network, so that algebraic relations hold in each
-//! row. No step is ever cut for a row. Where the circuit is of index 2, charges say too little: there a shorter step of
-//! TR-BDF2 leads from the step's start to the row.
+//! No step is ever cut for a row.
 
-use super::methods::{Dense, Work, trbdf2};
+use super::inside::Inside;
+use super::methods::Work;
 use super::network::Network;
-use super::newton::{Cut, Frozen, correct_frozen};
+use super::newton::Cut;
 use super::op::State;
 use super::settings::{Interval, Settings};
 use crate::trace::Sink;
 use std::io;
 
-/// Corrections of one row at most: an exponential that the guess overshoots comes down by one n·Vt each time.
-const MOST_CORRECTIONS: u32 = 40;
 /// How often a step is halved for straight lines at most.
 const MOST_HALVED: u32 = 8;
 
@@ -26,10 +23,6 @@ const STRAIGHT: f64 = 0.75;
 
 /// What rounding may make of a column, as a part of its magnitude.
 const ROUNDING: f64 = 1e-12;
-
-/// Within this part of a step of index 2 a row lies on the straight line: a step so short would have only rounding in
-/// its rates.
-const SHORT: f64 = 1e-6;
 
 /// Why rows ended.
 #[derive(Debug)]
@@ -69,18 +62,6 @@ pub(crate) struct Rows<'a> {
     low: Vec<f64>,
     high: Vec<f64>,
     inside: Inside,
-}
-
-/// Values of all unknowns at times within an accepted step.
-pub(crate) struct Inside {
-    pub point: State,
-    /// Charges that are states.
-    held: Vec<bool>,
-    /// Whether the frozen network is factorised for this step; `None`: not yet tried.
-    pub factorised: Option<bool>,
-    /// Values of a shorter step, and where the dense output of the whole one waits meanwhile.
-    shorter: State,
-    dense: Dense,
 }
 
 impl<'a> Rows<'a> {
@@ -170,7 +151,7 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.inside.factorised = None;
+        self.inside.begin();
         loop {
             let due = self.next_time();
             if due >= to.t - self.slack {
@@ -202,7 +183,7 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.inside.factorised = None;
+        self.inside.begin();
         self.inside.point.copy_from(state);
         self.inside.finish_point(
             network,
@@ -231,7 +212,7 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.inside.factorised = None;
+        self.inside.begin();
         if to.t < self.start {
             return Ok(());
         }
@@ -353,159 +334,5 @@ impl<'a> Rows<'a> {
             return Err(Stopped::Values(self.row[0], Cut::NonFinite { device }));
         }
         Ok(())
-    }
-}
-
-impl Inside {
-    pub fn new(network: &Network) -> Inside {
-        let system = network.system;
-        Inside {
-            point: State::new(0.0, system.equations(), system.charges()),
-            held: system.held.clone(),
-            factorised: None,
-            shorter: State::new(0.0, system.equations(), system.charges()),
-            dense: Dense::new(system.equations(), system.charges()),
-        }
-    }
-
-    /// Puts the values at a time inside a step into `self.point`.
-    #[allow(clippy::too_many_arguments)]
-    pub fn between(
-        &mut self,
-        network: &mut Network,
-        from: &State,
-        to: &State,
-        time: f64,
-        index2: bool,
-        weights: &[f64],
-        work: &mut Work,
-    ) -> Result<(), Stopped> {
-        let theta = (time - from.t) / (to.t - from.t);
-        if index2 {
-            return self.shorter_step(network, from, to, time, weights, work);
-        }
-        work.dense.unknowns(theta, from, to, &mut self.point.x);
-        work.dense.charges(theta, from, to, &mut self.point.q);
-        for (k, w) in self.point.w.iter_mut().enumerate() {
-            *w = from.w[k] + theta * (to.w[k] - from.w[k]);
-        }
-        // On a ramp laws make much of the least error of a charge: what was interpolated stands.
-        let ramped = network.any_ramped();
-        let belong = self.finish_point(network, time, ramped, weights, work)?;
-        if !belong && theta >= SHORT {
-            // Charges of junctions that are almost empty say little of their voltages: a step to the row says more.
-            self.shorter.copy_from(&self.point);
-            std::mem::swap(&mut self.dense, &mut work.dense);
-            let taken = trbdf2::step(network, from, &mut self.shorter, weights, work);
-            std::mem::swap(&mut self.dense, &mut work.dense);
-            if taken.is_ok() {
-                self.point.copy_from(&self.shorter);
-            }
-            self.factorised = None;
-        }
-        Ok(())
-    }
-
-    /// The same by a step of its own, so that algebraic relations between charges and rates hold.
-    fn shorter_step(
-        &mut self,
-        network: &mut Network,
-        from: &State,
-        to: &State,
-        time: f64,
-        weights: &[f64],
-        work: &mut Work,
-    ) -> Result<(), Stopped> {
-        let theta = (time - from.t) / (to.t - from.t);
-        self.point.t = time;
-        if theta < SHORT {
-            let line = |out: &mut [f64], from: &[f64], to: &[f64]| {
-                for (out, (from, to)) in out.iter_mut().zip(from.iter().zip(to)) {
-                    *out = from + theta * (to - from);
-                }
-            };
-            line(&mut self.point.x, &from.x, &to.x);
-            line(&mut self.point.q, &from.q, &to.q);
-            line(&mut self.point.w, &from.w, &to.w);
-            return Ok(());
-        }
-        match trbdf2::step(network, from, &mut self.point, weights, work) {
-            Ok(_) => Ok(()),
-            Err(cut) => Err(Stopped::Values(time, cut)),
-        }
-    }
-
-    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`. Says
-    /// whether they do as far as could be.
-    pub fn finish_point(
-        &mut self,
-        network: &mut Network,
-        time: f64,
-        as_is: bool,
-        weights: &[f64],
-        work: &mut Work,
-    ) -> Result<bool, Stopped> {
-        self.point.t = time;
-        if as_is {
-            return Ok(true);
-        }
-        work.x.copy_from_slice(&self.point.x);
-        work.w.copy_from_slice(&self.point.w);
-        let targets = std::mem::take(&mut self.point.q);
-        let corrected = self.correct(network, &targets, time, weights, work);
-        self.point.q = targets;
-        let belong = corrected.map_err(|cut| Stopped::Values(time, cut))?;
-        if belong {
-            self.point.x.copy_from_slice(&work.x);
-            self.point.w.copy_from_slice(&work.w);
-        }
-        Ok(belong)
-    }
-
-    /// Whether the correction came to its end; an error where there are no finite values.
-    fn correct(
-        &mut self,
-        network: &mut Network,
-        targets: &[f64],
-        time: f64,
-        weights: &[f64],
-        work: &mut Work,
-    ) -> Result<bool, Cut> {
-        let Work { x, w, q, scratch, .. } = work;
-        let held = &self.held;
-        let frozen = Frozen { t: time, held, targets, floors: weights, most: 1, prime: false };
-        if self.factorised.is_none() {
-            self.factorised = Some(network.factorise_frozen(held).is_ok());
-        }
-        for iteration in 0..MOST_CORRECTIONS {
-            if self.factorised != Some(true) || iteration >= 2 {
-                // The slopes of the step's start no longer serve.
-                network.linearise(x, time, false);
-                if network.factorise_frozen(held).is_err() {
-                    self.factorised = None;
-                    return self.keep_guess(network, time, work);
-                }
-                self.factorised = Some(true);
-            }
-            let update = correct_frozen(network, &frozen, x, w, q, scratch);
-            if update <= 0.02 || (iteration == 0 && network.system.is_linear()) {
-                return Ok(true);
-            }
-            if !update.is_finite() {
-                break;
-            }
-        }
-        self.factorised = None;
-        self.keep_guess(network, time, work)
-    }
-
-    /// The corrections may have led astray: what was interpolated stands, where the laws have values there.
-    fn keep_guess(&self, network: &mut Network, time: f64, work: &mut Work) -> Result<bool, Cut> {
-        network.evaluate(&self.point.x, time);
-        network.residual(&self.point.x, time, &mut work.right);
-        if work.right.iter().all(|r| r.is_finite()) {
-            return Ok(false);
-        }
-        Err(Cut::NonFinite { device: network.non_finite_law() })
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn probe(leaf: &Leaf) -> Option<Probe> {
         Leaf::Voltage(a, b) => Some(Probe::Voltage(a, b)),
         Leaf::Current(id) => Some(Probe::Current(id)),
         Leaf::Part(_, probe) => Some(probe),
-        Leaf::Time => None,
+        Leaf::Capacitance(_) | Leaf::Time => None,
     }
 }
 
@@ -48,6 +48,7 @@ fn value(expr: &Expr, at: &dyn Fn(Probe) -> Complex) -> Complex {
         Node::Leaf(Leaf::Voltage(a, b)) => at(Probe::Voltage(*a, *b)),
         Node::Leaf(Leaf::Current(id)) => at(Probe::Current(*id)),
         Node::Leaf(Leaf::Part(part, probe)) => Complex::from(part_of(*part, at(*probe))),
+        Node::Leaf(Leaf::Capacitance(_)) => Complex::from(f64::NAN),
         Node::Leaf(Leaf::Time) => Complex::ZERO,
         Node::Unary(Unary::Negate, a) => -of(a),
         Node::Unary(Unary::Not, a) => truth(of(a).is_zero()),

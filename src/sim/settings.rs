@@ -59,10 +59,21 @@ pub struct Settings {
     pub h0: Option<f64>,
     /// Integration method.
     pub method: Method,
+    /// Which value a row of a grid or list holds at a jump.
+    pub jumps: Side,
     /// Ends the run when it becomes true.
     pub interrupt: Option<Arc<AtomicBool>>,
     /// Told of progress.
     pub progress: Option<Progress>,
+}
+
+/// A side of a jump.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The value that is arrived at: at 0 that of the operating point. What simulators write whose rows are their steps.
+    Before,
+    /// The value that goes on.
+    After,
 }
 
 impl fmt::Debug for Settings {
@@ -95,6 +106,7 @@ impl Settings {
             hmax: None,
             h0: None,
             method: Method::Auto,
+            jumps: Side::After,
             interrupt: None,
             progress: None,
         }
@@ -173,6 +185,7 @@ pub const OPTIONS: &[OptionRow] = &[
     OptionRow { name: "tol", meaning: "`scaled` (absolute tolerances by magnitude) or `spice` (vntol and abstol as they stand)", set: set_tolerance },
     OptionRow { name: "hmax", meaning: "the largest step in seconds, above 0, or `auto`", set: |s, v| time(v, &mut s.hmax) },
     OptionRow { name: "h0", meaning: "the first step in seconds, above 0, or `auto`", set: |s, v| time(v, &mut s.h0) },
+    OptionRow { name: "jumps", meaning: "`after` or `before`: which value a row of a grid or list holds at a jump", set: set_jumps },
     OptionRow { name: "method", meaning: "`auto`, `rodas5p`, `rodas4`, `trbdf2`, `trap` or `gear`", set: set_method },
 ];
 
@@ -242,6 +255,15 @@ fn set_tolerance(settings: &mut Settings, text: &str) -> bool {
     settings.tolerance = match text.to_ascii_lowercase().as_str() {
         "scaled" | "auto" => Tolerance::Scaled,
         "spice" => Tolerance::Spice,
+        _ => return false,
+    };
+    true
+}
+
+fn set_jumps(settings: &mut Settings, text: &str) -> bool {
+    settings.jumps = match text.to_ascii_lowercase().as_str() {
+        "after" => Side::After,
+        "before" => Side::Before,
         _ => return false,
     };
     true

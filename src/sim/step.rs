@@ -11,12 +11,13 @@ use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
 use super::events::Controls;
 use super::explain::{Failure, FailureKind, Moment, failure};
+use super::inside::Inside;
 use super::methods::{self, Method, Work};
 use super::network::Network;
 use super::newton::Cut;
 use super::op::{self, State};
-use super::output::{Inside, Rows};
-use super::settings::{Settings, Tolerance};
+use super::output::Rows;
+use super::settings::{Settings, Side, Tolerance};
 use super::statistics::Statistics;
 use super::system::System;
 use crate::circuit::Waveform;
@@ -251,6 +252,9 @@ impl<'a> Run<'a> {
             }
             self.check_interrupt()?;
             let (corner, event) = self.advance()?;
+            if self.settings.jumps == Side::Before {
+                self.rows_as_arrived()?;
+            }
             if let Some(mode) = event {
                 self.pass_event(mode)?;
             }

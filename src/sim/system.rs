@@ -248,6 +248,18 @@ impl System {
         self.unknowns.len()
     }
 
+    /// Makes 0 of every unknown that no charge depends on.
+    pub fn keep_stored(&self, x: &mut [f64]) {
+        let mut stored = vec![false; x.len()];
+        self.charges.columns.iter().for_each(|k| stored[*k as usize] = true);
+        for group in &self.groups {
+            group.charge_slopes.iter().for_each(|(_, _, k)| stored[*k as usize] = true);
+        }
+        for (x, stored) in x.iter_mut().zip(stored) {
+            *x = if stored { *x } else { 0.0 };
+        }
+    }
+
     /// Number of charges and fluxes.
     pub fn charges(&self) -> usize {
         self.charge_devices.len()

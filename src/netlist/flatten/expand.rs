@@ -7,7 +7,9 @@ use super::vary::Variation;
 use crate::circuit::{self, DeviceId, Node, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::read::number;
-use crate::netlist::{Branch, Card, CardKind, Device, Element, Expr, Name, Netlist, Subcircuit};
+use crate::netlist::{
+    Branch, Card, CardKind, Device, Element, Expr, Leaf, Name, Netlist, Subcircuit,
+};
 use crate::quantity::nearest;
 use crate::source::Span;
 use std::cell::RefCell;
@@ -447,7 +449,9 @@ impl<'n> Expander<'n> {
                 varying.push(*name);
                 continue;
             }
-            let value = scope::number(&self.flat.scopes, id, expr, names, d).unwrap_or(f64::NAN);
+            // What nothing outside is called may be another parameter of this card: `x1 a b s p=2 q={3*p}`.
+            let expr = self.of_card(id, parameters, expr, 0);
+            let value = scope::number(&self.flat.scopes, id, &expr, names, d).unwrap_or(f64::NAN);
             values.push((*name, Expr::new(crate::expr::Node::Number(value), expr.span)));
         }
         let inner = ScopeId(self.flat.scopes.all.len() as u32);
@@ -464,7 +468,15 @@ impl<'n> Expander<'n> {
             .chain(&values)
             .map(|(name, expr)| (*name, expr))
             .collect();
-        let (live, given) = self.choose(inner, &subcircuit.cards, &outer, &[], d);
+        let (live, mut given) = self.choose(inner, &subcircuit.cards, &outer, &[], d);
+        if self.flat.netlist.dialect.reading().instance_wins {
+            let said = |name: &Name| values.iter().any(|(own, _)| own == name);
+            let mut k = 0;
+            given.retain(|(name, _)| {
+                k += 1;
+                k <= outer.len() || !said(name)
+            });
+        }
         let own = live.iter().flat_map(|card| parameters_of(card));
         let written = (subcircuit.parameters.iter().map(|(name, expr)| (*name, (inner, expr))))
             .chain(parameters.iter().map(|(name, expr)| (*name, (id, expr))))
@@ -475,6 +487,27 @@ impl<'n> Expander<'n> {
         self.chain.push(subcircuit);
         self.body(inner, &live, d);
         self.chain.pop();
+    }
+}
+
+impl<'n> Expander<'n> {
+    /// An expression of an X card with the card's own parameters in the places of names that mean nothing around it.
+    fn of_card(&self, id: ScopeId, parameters: &[(Name, Expr)], expr: &Expr, depth: usize) -> Expr {
+        let names = &self.flat.netlist.names;
+        expr.map(&mut |leaf, span| {
+            let given = match leaf {
+                Leaf::Parameter(name) if self.flat.scopes.value(id, *name, names).is_none() => {
+                    parameters.iter().find(|(own, _)| own == name)
+                }
+                _ => None,
+            };
+            match given {
+                Some((_, given)) if depth < parameters.len().min(DEEPEST) => {
+                    self.of_card(id, parameters, given, depth + 1)
+                }
+                _ => Expr::new(crate::expr::Node::Leaf(leaf.clone()), span),
+            }
+        })
     }
 }
 

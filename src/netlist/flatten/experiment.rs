@@ -15,13 +15,22 @@ use crate::netlist::{CardKind, Expr, Leaf, Name};
 use crate::source::{FileId, Span};
 use std::collections::{HashMap, HashSet};
 
+/// The tolerance where it is elsewhere a part of each present value, rather than of the largest so far.
+const PRESENT: &str = "1e-4";
+
 /// Analyses, and options with those of the header last.
 pub fn settings(
     flat: &Flat,
     header: &Header,
     d: &mut Vec<Diagnostic>,
 ) -> (Vec<Analysis>, Vec<(String, String)>) {
-    let (mut analyses, mut options) = (vec![], vec![]);
+    let mut analyses = vec![];
+    let mut options = vec![];
+    // A deck is answered as its simulator answers; a text of ours, whatever its dialect, as its bond graph.
+    if flat.netlist.dialect.reading().arrives && *header == Header::default() {
+        options.push(("jumps".to_string(), "before".to_string()));
+        options.push(("reltol".to_string(), PRESENT.to_string()));
+    }
     for card in &flat.live {
         match &card.kind {
             CardKind::Options(given) => options.extend(given.iter().cloned()),
@@ -151,11 +160,12 @@ fn voltages(
     found
 }
 
-/// An item of `.print` and its like. A bare word is a node, or else a parameter.
+/// An item of `.print` and its like. A bare word is a node, or else a parameter or the value of a device.
 pub fn item(lookup: &Lookup, text: &str, expr: &Expr, d: &mut Vec<Diagnostic>) -> Option<Output> {
     if let crate::expr::Node::Leaf(Leaf::Parameter(name)) = &*expr.node {
         let parameter = || lookup.flat.scopes.value(TOP, *name, lookup.names).is_some();
-        if lookup.has_node(TOP, *name) || !(text.contains(':') || parameter()) {
+        let value = || text.contains(':') || parameter() || lookup.has_device(TOP, *name);
+        if lookup.has_node(TOP, *name) || !value() {
             let node = lookup.node(TOP, *name, expr.span, d)?;
             let expr = circuit::Expr::leaf(circuit::Leaf::Voltage(node, NodeId(0)));
             return Some(Output { name: format!("v({text})"), expr });

@@ -143,6 +143,9 @@ pub fn varies(scopes: &Scopes, id: ScopeId, expr: &Expr) -> bool {
 pub fn constant(name: &str) -> Option<f64> {
     match name.to_ascii_lowercase().as_str() {
         "pi" => Some(std::f64::consts::PI),
+        // Xyce's; as functions of one argument are called, nothing else is hidden.
+        "exp" => Some(std::f64::consts::E),
+        "ctok" => Some(273.15),
         "temper" => Some(NOMINAL),
         _ => None,
     }

@@ -87,22 +87,8 @@ impl<'f, 'n> Lookup<'f, 'n> {
         d: &mut Vec<Diagnostic>,
     ) -> Option<NodeId> {
         let text = self.names.text(name);
-        if text == "0" {
-            return Some(NodeId(0));
-        }
-        let scope = self.flat.scopes.get(id);
-        let global = || {
-            let known = self.flat.scopes.globals.contains_key(&name);
-            known.then(|| self.flat.scopes.get(scope::TOP).nodes.get(&name)).flatten()
-        };
-        if let Some(node) = scope.nodes.get(&name).or_else(global) {
-            return Some(*node);
-        }
-        if text.contains(['.', ':']) {
-            let path = format!("{}{}", scope.path, text.replace(':', ".")).to_lowercase();
-            if let Some(node) = self.paths().nodes.get(&path) {
-                return Some(*node);
-            }
+        if let Some(node) = self.find_node(id, name) {
+            return Some(node);
         }
         let near = nearest(
             text,
@@ -163,25 +149,74 @@ impl<'f, 'n> Lookup<'f, 'n> {
         None
     }
 
-    /// A value of a device by its key, `r1:r`.
-    fn device_value(&self, id: ScopeId, name: Name, d: &mut Vec<Diagnostic>) -> Option<f64> {
-        let (path, key) = self.names.text(name).rsplit_once(':')?;
-        let path = format!("{}{}", self.flat.scopes.get(id).path, path.replace(':', "."));
-        let device = self.paths().devices.get(&path.to_lowercase())?;
+    /// Whether a device of this name stands in a scope.
+    pub fn has_device(&self, id: ScopeId, name: Name) -> bool {
+        self.find_value(id, self.names.text(name)).is_some()
+    }
+
+    /// The device whose value a name means, and the key of the value, which may be left out: `r1`, `r1:temp`.
+    fn find_value<'t>(&self, id: ScopeId, text: &'t str) -> Option<(DeviceId, Option<&'t str>)> {
+        let find = |path: &str| {
+            let path = format!("{}{}", self.flat.scopes.get(id).path, path.replace(':', "."));
+            self.paths().devices.get(&path.to_lowercase()).copied()
+        };
+        find(text).map(|device| (device, None)).or_else(|| {
+            let (path, key) = text.rsplit_once(':')?;
+            Some((find(path)?, Some(key)))
+        })
+    }
+
+    /// A value of a device as it stands on its card, which may be a law.
+    fn device_value(
+        &self,
+        id: ScopeId,
+        name: Name,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<circuit::Expr> {
+        let (device, key) = self.find_value(id, self.names.text(name))?;
         let pending = self.flat.devices.get(device.0 as usize)?;
-        let mut element = pending.device.element.clone();
-        let expr = super::vary::value_of(&mut element, Some(key))?;
-        self.number(pending.scope, expr, d)
+        let element = &pending.device.element;
+        let is = |other: &str| key.is_some_and(|key| key.eq_ignore_ascii_case(other));
+        if is("cd") && matches!(element, Element::Diode { .. }) {
+            return Some(circuit::Expr::leaf(circuit::Leaf::Capacitance(device)));
+        }
+        match super::vary::value_in(element, key) {
+            Some(expr) => self.law(pending.scope, &expr, d),
+            None if is("temp") => Some(circuit::Expr::number(self.flat.temperature)),
+            None => None,
+        }
     }
 
     /// Whether a node of this name stands in a scope.
     pub fn has_node(&self, id: ScopeId, name: Name) -> bool {
+        self.find_node(id, name).is_some()
+    }
+
+    /// A node by its name in a scope, or by its full one; a terminal of an instance by its name there (`x1:in`).
+    fn find_node(&self, id: ScopeId, name: Name) -> Option<NodeId> {
         let text = self.names.text(name);
+        if text == "0" {
+            return Some(NodeId(0));
+        }
         let scope = self.flat.scopes.get(id);
-        let path = || format!("{}{text}", scope.path).to_lowercase();
-        text == "0"
-            || scope.nodes.contains_key(&name)
-            || (text.contains('.') && self.paths().nodes.contains_key(&path()))
+        let global = || {
+            let known = self.flat.scopes.globals.contains_key(&name);
+            known.then(|| self.flat.scopes.get(scope::TOP).nodes.get(&name)).flatten()
+        };
+        if let Some(node) = scope.nodes.get(&name).or_else(global) {
+            return Some(*node);
+        }
+        if !text.contains(['.', ':']) {
+            return None;
+        }
+        let path = format!("{}{}", scope.path, text.replace(':', ".")).to_lowercase();
+        if let Some(node) = self.paths().nodes.get(&path) {
+            return Some(*node);
+        }
+        let own = self.names.find(text.rsplit(['.', ':']).next()?)?;
+        let around = path.rsplit_once('.')?.0;
+        let inner = *self.paths().scopes.get(&format!("{around}."))?;
+        self.flat.scopes.get(inner).nodes.get(&own).copied()
     }
 
     /// v·i of a device between its first two nodes.
@@ -226,12 +261,11 @@ impl<'f, 'n> Lookup<'f, 'n> {
                 }
                 Leaf::Parameter(name) => {
                     let (place, own) = self.parameter(id, *name);
-                    let value = self
-                        .flat
-                        .scopes
-                        .value(place, own, self.names)
-                        .or_else(|| self.device_value(id, *name, d));
+                    let value = self.flat.scopes.value(place, own, self.names);
                     if value.is_none() {
+                        if let Some(law) = self.device_value(id, *name, d) {
+                            return law;
+                        }
                         let error = scope::unknown_parameter(
                             &self.flat.scopes,
                             id,

@@ -10,7 +10,9 @@
 
 use super::scope::Table;
 use crate::diagnostic::Diagnostic;
-use crate::netlist::{Card, CardKind, Device, Element, Expr, Name, Netlist, Waveform};
+use crate::netlist::{
+    Card, CardKind, Device, Element, Expr, Name, Netlist, Passive, PassiveKind, Waveform,
+};
 use crate::quantity::nearest;
 use crate::source::Span;
 use std::collections::HashMap;
@@ -140,17 +142,59 @@ fn find<'n>(netlist: &'n Netlist, path: &str) -> Option<&'n Device> {
     }
 }
 
-/// The value of an element that a key names; its first without a key.
+/// The value of an element that a key names, as it stands there; its first without a key.
+pub fn value_in(element: &Element, key: Option<&str>) -> Option<Expr> {
+    if let Element::VoltageSource(source) | Element::CurrentSource(source) = element
+        && let (None, Waveform::Constant(value)) = (&source.dc, &source.waveform)
+        && key.is_none_or(|key| DIRECT.iter().any(|own| own.eq_ignore_ascii_case(key)))
+    {
+        return Some(value.clone());
+    }
+    if let Some(key) = key.filter(|key| is_passive(key)) {
+        let parameters = match element {
+            Element::Passive(passive) => &passive.parameters[..],
+            Element::Resistor { .. } | Element::Capacitor { .. } | Element::Inductor { .. } => &[],
+            _ => return None,
+        };
+        let said = parameters.iter().find(|(own, _)| own.eq_ignore_ascii_case(key));
+        let one = || key.eq_ignore_ascii_case("m").then(|| Expr::number(1.0));
+        return said.map(|(_, value)| value.clone()).or_else(one);
+    }
+    value_of(&mut element.clone(), key).cloned()
+}
+
+fn is_passive(key: &str) -> bool {
+    PASSIVE.iter().any(|own| own.eq_ignore_ascii_case(key))
+}
+
+/// Keys of the DC value of a source.
+const DIRECT: &[&str] = &["dc", "dcv0", "v", "i"];
+
+/// Keys that any resistor, capacitor or inductor may have.
+const PASSIVE: &[&str] = &["m", "temp", "tc1", "tc2"];
+
+/// The value of an element that a key names, to be set; its first without a key.
 pub fn value_of<'e>(element: &'e mut Element, key: Option<&str>) -> Option<&'e mut Expr> {
     let is =
         |names: &[&str]| key.is_none_or(|key| names.iter().any(|n| n.eq_ignore_ascii_case(key)));
+    if let Some(key) = key.filter(|key| is_passive(key)) {
+        let passive = as_passive(element)?;
+        let key = key.to_lowercase();
+        let known = passive.parameters.iter().position(|(own, _)| *own == key);
+        let at = known.unwrap_or_else(|| {
+            passive.parameters.push((key, Expr::number(0.0)));
+            passive.parameters.len() - 1
+        });
+        return passive.parameters.get_mut(at).map(|(_, value)| value);
+    }
     match element {
-        Element::Resistor { value } if is(&["r", "resistance"]) => Some(value),
-        Element::Capacitor { value, .. } if is(&["c", "capacitance"]) => Some(value),
-        Element::Inductor { value, .. } if is(&["l", "inductance"]) => Some(value),
+        Element::Passive(passive) if is(passive.kind.keys()) => passive.value.as_mut(),
+        Element::Resistor { value } if is(PassiveKind::Resistor.keys()) => Some(value),
+        Element::Capacitor { value, .. } if is(PassiveKind::Capacitor.keys()) => Some(value),
+        Element::Inductor { value, .. } if is(PassiveKind::Inductor.keys()) => Some(value),
         Element::Mutual { coupling, .. } if is(&["k", "coupling"]) => Some(coupling),
         Element::VoltageSource(source) | Element::CurrentSource(source) => {
-            if is(&["dc", "dcv0", "v", "i"]) {
+            if is(DIRECT) {
                 Some(source.dc.get_or_insert(Expr::number(0.0)))
             } else if is(&["acmag", "acphase"]) {
                 let ac = source.ac.get_or_insert([Expr::number(0.0), Expr::number(0.0)]);
@@ -171,6 +215,29 @@ pub fn value_of<'e>(element: &'e mut Element, key: Option<&str>) -> Option<&'e m
         Element::Line { impedance, .. } if is(&["z0", "zo"]) => Some(impedance),
         Element::Line { delay, .. } if is(&["td"]) => Some(delay),
         Element::Diode { area, .. } if is(&["area"]) => Some(area.get_or_insert(Expr::number(1.0))),
+        _ => None,
+    }
+}
+
+/// A resistor, capacitor or inductor as one that may have parameters.
+fn as_passive(element: &mut Element) -> Option<&mut Passive> {
+    let plain = |kind, value: &Expr, initial: &Option<Expr>| Passive {
+        kind,
+        value: Some(value.clone()),
+        model: None,
+        initial: initial.clone(),
+        parameters: vec![],
+    };
+    let passive = match &*element {
+        Element::Resistor { value } => plain(PassiveKind::Resistor, value, &None),
+        Element::Capacitor { value, initial } => plain(PassiveKind::Capacitor, value, initial),
+        Element::Inductor { value, initial } => plain(PassiveKind::Inductor, value, initial),
+        Element::Passive(passive) => (**passive).clone(),
+        _ => return None,
+    };
+    *element = Element::Passive(Box::new(passive));
+    match element {
+        Element::Passive(passive) => Some(passive),
         _ => None,
     }
 }

@@ -319,6 +319,10 @@ pub fn reading(reader: &mut Reader, text: &str) -> Option<Leaf> {
     }
     match (name.to_ascii_lowercase().as_str(), &words[..]) {
         ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(reader.names.intern(device))),
+        // An inner variable of a device, else a node.
+        ("n", [own]) if own.to_ascii_lowercase().ends_with(":cd") && plain(own) => {
+            Some(Leaf::Parameter(reader.names.intern(own)))
+        }
         ("n", [_]) => voltage(reader, &words),
         _ => {
             let part = phasor_part(name).filter(|_| name.len() > 1)?;

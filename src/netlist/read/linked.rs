@@ -30,10 +30,16 @@ pub fn linked(reader: &mut Reader, cursor: &mut Cursor) -> Option<Linked> {
         cursor.take(b'=');
         return Some(Linked::Law(law(reader, cursor)?));
     }
-    if is("table") {
+    // The expression may stand without braces: `TABLE V(a,b) = (…)`.
+    let bare = || {
+        let mut after = ahead;
+        after.word();
+        word.eq_ignore_ascii_case("table") && after.peek() == Some(b'(')
+    };
+    if is("table") || bare() {
         *cursor = ahead;
         cursor.take(b'=');
-        let x = reader.value(cursor, "the expression of the table")?;
+        let x = passive::law(reader, cursor, "the expression of the table")?;
         return Some(Linked::Law(table(reader, cursor, x)?));
     }
     if is("laplace") {

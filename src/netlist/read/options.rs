@@ -43,6 +43,10 @@ const KEYS: &[(&str, &str, &[&str])] = &[
     ("output", "initial_interval", &["initial_interval"]),
 ];
 
+/// A looser tolerance of Xyce is passed over: there it is a part of each present value, here of the largest so far, and
+/// what dies away would be lost.
+const LOOSEST: f64 = 1e-3;
+
 /// Xyce's numbers of methods.
 const METHODS: &[(&str, &str)] = &[("7", "trap"), ("8", "gear")];
 
@@ -73,8 +77,7 @@ pub fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
         let row = KEYS.iter().find(|(of, known, _)| of == package && *known == key);
         let method = METHODS.iter().find(|(number, _)| key == "method" && *number == value);
         let value = method.map_or(value, |(_, name)| name.to_string());
-        // A tolerance of 1 or more asks for nothing.
-        let loose = key == "reltol" && value.parse::<f64>().is_ok_and(|tolerance| tolerance >= 1.0);
+        let loose = key == "reltol" && value.parse::<f64>().is_ok_and(|reltol| reltol > LOOSEST);
         match row {
             Some((_, _, names)) if !loose => {
                 options.extend(names.iter().map(|name| (name.to_string(), value.clone())));

@@ -54,6 +54,10 @@ pub fn source(reader: &mut Reader, cursor: &mut Cursor) -> Option<Source> {
             cursor.word();
             cursor.take(b'=');
             ac = Some(phasor(reader, cursor)?);
+        } else if is_idle(word) {
+            cursor.word();
+            cursor.take(b'=');
+            phasor(reader, cursor)?;
         } else if word.eq_ignore_ascii_case(PATTERN) {
             function = Some(pattern(reader, cursor)?);
         } else if let Some(row) = find(word) {
@@ -96,9 +100,17 @@ fn find(word: &str) -> Option<&'static Row> {
     WAVEFORMS.iter().find(|row| row.name.eq_ignore_ascii_case(word))
 }
 
+/// Phasors of analyses that there are none of here: of distortion.
+const IDLE: &[&str] = &["distof1", "distof2"];
+
+fn is_idle(word: &str) -> bool {
+    IDLE.iter().any(|key| key.eq_ignore_ascii_case(word))
+}
+
 /// Whether a word of a source's card means more than a value.
 fn is_keyword(word: &str) -> bool {
-    ["dc", "ac", PATTERN].iter().any(|key| key.eq_ignore_ascii_case(word)) || find(word).is_some()
+    let own = ["dc", "ac", PATTERN].iter().any(|key| key.eq_ignore_ascii_case(word));
+    own || is_idle(word) || find(word).is_some()
 }
 
 /// Arguments, with or without brackets, and what has a key among or behind them.

@@ -95,6 +95,9 @@ pub(crate) struct Dense {
     pub x: [Vec<f64>; 3],
     /// k₁, k₂, k₃ of the charges.
     pub q: [Vec<f64>; 3],
+    /// Whether charges between are those of the unknowns between, rather than polynomials of their own: a junction that
+    /// leaves its conduction has lost almost all of its charge, and the rest says where its voltage is.
+    pub by_unknowns: bool,
 }
 
 impl Dense {
@@ -102,11 +105,25 @@ impl Dense {
         Dense {
             x: std::array::from_fn(|_| vec![0.0; n]),
             q: std::array::from_fn(|_| vec![0.0; charges]),
+            by_unknowns: false,
         }
+    }
+
+    /// Parabolas of the unknowns through their values at a part of the step; charges follow from them.
+    pub fn parabolas(&mut self, theta: f64, from: &State, middle: &[f64], to: &State) {
+        self.by_unknowns = true;
+        let [first, second, third] = &mut self.x;
+        for (i, k) in first.iter_mut().enumerate() {
+            let line = (1.0 - theta) * from.x[i] + theta * to.x[i];
+            *k = (middle[i] - line) / (theta * (1.0 - theta));
+        }
+        second.fill(0.0);
+        third.fill(0.0);
     }
 
     /// Cubic polynomials of the charges through their values and rates at both ends; straight lines of the unknowns.
     pub fn hermite(&mut self, from: &State, to: &State) {
+        self.by_unknowns = false;
         let h = to.t - from.t;
         for k in 0..from.q.len() {
             let change = to.q[k] - from.q[k];

@@ -176,6 +176,7 @@ pub(crate) fn step(
         return Err(Cut::NonFinite { device: network.non_finite_law() });
     }
     if size <= 1.0 {
+        dense.by_unknowns = false;
         for (k, row) in tableau.dense.iter().enumerate() {
             dense.x[k].fill(0.0);
             dense.q[k].fill(0.0);

@@ -10,7 +10,7 @@
 //! Rates are kept for each charge, and algebraic equations hold at each stage, so that nothing rings.
 //! Source: M. E. Hosea, L. F. Shampine, Analysis and implementation of TR-BDF2, Appl. Numer. Math. 20:21-37, 1996.
 
-use super::{Dense, Work, filtered_error, weighted};
+use super::{Work, filtered_error, weighted};
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::State;
@@ -19,6 +19,9 @@ use std::f64::consts::SQRT_2;
 /// Error of iteration against the tolerance of the step.
 pub(crate) const ITERATION: f64 = 0.02;
 
+/// The part of the step at which the middle stage stands.
+const GAMMA: f64 = 2.0 - SQRT_2;
+
 pub(crate) fn step(
     network: &mut Network,
     from: &State,
@@ -26,7 +29,6 @@ pub(crate) fn step(
     weights: &[f64],
     work: &mut Work,
 ) -> Result<f64, Cut> {
-    const GAMMA: f64 = 2.0 - SQRT_2;
     const D: f64 = GAMMA / 2.0;
     const W: f64 = SQRT_2 / 4.0;
     let h = to.t - from.t;
@@ -62,13 +64,8 @@ pub(crate) fn step(
         *sum = h * ((1.0 - 4.0 * W) / 3.0 * from.w[k] + w[k] / 3.0 - 2.0 * D / 3.0 * to.w[k]);
     }
     filtered_error(network, alpha, sum, error);
-    dense.hermite(from, to);
-    // The unknowns between: a parabola through the middle stage.
-    for (i, k) in dense.x[0].iter_mut().enumerate() {
-        let line = (1.0 - GAMMA) * from.x[i] + GAMMA * to.x[i];
-        *k = (x[i] - line) / (GAMMA * (1.0 - GAMMA));
-    }
-    let rates = rate_error(h, q, from, to, dense, [rate_weights, rate_floors]);
+    dense.parabolas(GAMMA, from, x, to);
+    let rates = rate_error(h, q, from, to, [rate_weights, rate_floors]);
     Ok(weighted(error, weights).max(rates))
 }
 
@@ -80,10 +77,8 @@ fn rate_error(
     middle: &[f64],
     from: &State,
     to: &State,
-    dense: &Dense,
     [weights, floors]: [&[f64]; 2],
 ) -> f64 {
-    const GAMMA: f64 = 2.0 - SQRT_2;
     /// Of equal and opposite errors of the rates at the ends the cubic shows θ·(1 − θ)·h.
     const SEEN: f64 = GAMMA * (1.0 - GAMMA);
     let mut largest: f64 = 0.0;
@@ -92,7 +87,9 @@ fn rate_error(
             continue;
         }
         let line = (1.0 - GAMMA) * from.q[k] + GAMMA * to.q[k];
-        let curve = SEEN * (dense.q[0][k] + GAMMA * dense.q[1][k]);
+        let change = to.q[k] - from.q[k];
+        let (left, right) = (h * from.w[k] - change, change - h * to.w[k]);
+        let curve = SEEN * (left + GAMMA * (right - left));
         let missed = ((line + curve - middle[k]).abs() - floors[k]).max(0.0);
         largest = largest.max(missed / (SEEN * h * weight));
     }

@@ -23,7 +23,7 @@ impl Run<'_> {
             return Ok(());
         }
         let (from, to) = (self.state.t, self.next.t);
-        self.inside.factorised = None;
+        self.inside.begin();
         let ends = [self.inputs_of(false), self.inputs_of(true)];
         let mut middle = vec![];
         for theta in [0.25, 0.5, 0.75] {

@@ -7,6 +7,7 @@ use crate::sim::explain::{Failure, Moment, failure};
 use crate::sim::methods::{self, Method};
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::{self, State, Trouble};
+use crate::sim::settings::Side;
 
 /// The part of the tolerance that each step gets where the circuit is of index 2, at a `reltol` of 1e-6. A method of
 /// order 2 makes more of the errors of its steps: over a run they add up to their tolerance^(2/3). Below 1e-6 the part
@@ -60,8 +61,15 @@ impl Run<'_> {
                 failure(network.system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
             })?;
         }
+        let before = self.settings.jumps == Side::Before;
+        if before && !self.settings.uic {
+            self.rows_as_arrived()?;
+        }
         self.restart(Moment::Start)?;
         self.settle_memories(Moment::Start)?;
+        if before && self.settings.uic {
+            self.rows_as_stated()?;
+        }
         let (method, reason) = methods::choose(&self.network, self.index2);
         let (method, reason) = match self.settings.method {
             Method::Auto => (method, reason),

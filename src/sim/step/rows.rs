@@ -65,9 +65,28 @@ impl Run<'_> {
 
     /// The rows of a grid or list that are due now.
     pub(super) fn rows_at_state(&mut self) -> Result<(), Failure> {
-        let Run { network, state, weights, work, index2, rows, .. } = self;
+        let as_is = self.index2;
+        self.rows_due(as_is)
+    }
+
+    /// The same with the unknowns as they stand, before a corner or event is passed.
+    pub(super) fn rows_as_arrived(&mut self) -> Result<(), Failure> {
+        self.rows_due(true)
+    }
+
+    /// The first rows of a run that starts from stated values, with nothing solved: what is not stored is 0.
+    pub(super) fn rows_as_stated(&mut self) -> Result<(), Failure> {
+        let solved = self.state.x.clone();
+        self.network.system.keep_stored(&mut self.state.x);
+        let outcome = self.rows_due(true);
+        self.state.x = solved;
+        outcome
+    }
+
+    fn rows_due(&mut self, as_is: bool) -> Result<(), Failure> {
+        let Run { network, state, weights, work, rows, .. } = self;
         let Some(rows) = rows.as_mut() else { return Ok(()) };
-        let outcome = rows.at(network, state, state.t, *index2, weights, work);
+        let outcome = rows.at(network, state, state.t, as_is, weights, work);
         outcome.map_err(|stopped| self.row_failure(stopped))
     }
 }

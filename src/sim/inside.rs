@@ -1,0 +1,276 @@
+//! Values at times within an accepted step.
+//!
+//! Charges are interpolated, or where laws make them those of interpolated unknowns; all unknowns follow from them in the
+//! frozen network, so that algebraic relations hold. Where that says too little, shorter steps lead from the step's start
+//! to the time: in circuits of index 2, and where a junction bends the solution within the step.
+
+use super::methods::{self, Dense, Work, trbdf2};
+use super::network::Network;
+use super::newton::{Cut, Frozen, correct_frozen};
+use super::op::State;
+use super::output::Stopped;
+
+/// Corrections of one row at most: an exponential that the guess overshoots comes down by one n·Vt each time.
+const MOST_CORRECTIONS: u32 = 40;
+
+/// Within this part of a step of index 2 a row lies on the straight line: a step so short would have only rounding in
+/// its rates.
+const SHORT: f64 = 1e-6;
+
+/// Steps to one row at most.
+const MOST_STEPS: u32 = 200;
+
+/// Values of all unknowns at times within an accepted step.
+pub(crate) struct Inside {
+    pub point: State,
+    /// Charges that are states.
+    held: Vec<bool>,
+    /// Whether the frozen network is factorised for this step; `None`: not yet tried.
+    pub factorised: Option<bool>,
+    /// Whether what is interpolated in this step is too far from the equations; `None`: not yet asked.
+    rough: Option<bool>,
+    /// How far shorter steps have come from the left end.
+    reached: State,
+    /// Values of a shorter step, and where the dense output of the whole one waits meanwhile.
+    shorter: State,
+    dense: Dense,
+}
+
+impl Inside {
+    pub fn new(network: &Network) -> Inside {
+        let system = network.system;
+        Inside {
+            point: State::new(0.0, system.equations(), system.charges()),
+            held: system.held.clone(),
+            factorised: None,
+            rough: None,
+            reached: State::new(f64::NAN, system.equations(), system.charges()),
+            shorter: State::new(0.0, system.equations(), system.charges()),
+            dense: Dense::new(system.equations(), system.charges()),
+        }
+    }
+
+    /// Another step begins.
+    pub fn begin(&mut self) {
+        self.factorised = None;
+        self.rough = None;
+        self.reached.t = f64::NAN;
+    }
+
+    /// Puts the values at a time inside a step into `self.point`.
+    #[allow(clippy::too_many_arguments)]
+    pub fn between(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        time: f64,
+        index2: bool,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<(), Stopped> {
+        let theta = (time - from.t) / (to.t - from.t);
+        if index2 {
+            return self.shorter_step(network, from, to, time, weights, work);
+        }
+        let rough = *self.rough.get_or_insert_with(|| is_rough(network, from, to, weights, work));
+        work.dense.unknowns(theta, from, to, &mut self.point.x);
+        if work.dense.by_unknowns {
+            network.evaluate(&self.point.x, time);
+            network.charges(&self.point.x, &mut self.point.q);
+        } else {
+            work.dense.charges(theta, from, to, &mut self.point.q);
+        }
+        for (k, w) in self.point.w.iter_mut().enumerate() {
+            *w = from.w[k] + theta * (to.w[k] - from.w[k]);
+        }
+        self.point.t = time;
+        if rough && self.step_to_point(network, from, theta, weights, work) {
+            return Ok(());
+        }
+        // On a ramp laws make much of the least error of a charge: what was interpolated stands.
+        let ramped = network.any_ramped();
+        if !self.finish_point(network, time, ramped, weights, work)? {
+            // Charges of junctions that are almost empty say little of their voltages: a step says more.
+            self.step_to_point(network, from, theta, weights, work);
+        }
+        Ok(())
+    }
+
+    /// Goes from the left end to the time of `self.point` in steps that pass the error test. Says whether it has come there.
+    fn step_to_point(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        theta: f64,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> bool {
+        if theta < SHORT {
+            return false;
+        }
+        let end = self.point.t;
+        // Rows mostly follow each other: the last one's way is gone on with.
+        if !(self.reached.t >= from.t && self.reached.t <= end) {
+            self.reached.copy_from(from);
+        }
+        let mut h = end - self.reached.t;
+        std::mem::swap(&mut self.dense, &mut work.dense);
+        let mut left = MOST_STEPS;
+        while self.reached.t < end && left > 0 {
+            left -= 1;
+            let lands = self.reached.t + h >= end;
+            self.shorter.copy_from(&self.point);
+            self.shorter.t = if lands { end } else { self.reached.t + h };
+            let error = trbdf2::step(network, &self.reached, &mut self.shorter, weights, work);
+            let error = error.unwrap_or(f64::INFINITY);
+            if error <= 1.0 {
+                std::mem::swap(&mut self.reached, &mut self.shorter);
+            }
+            h *= (0.9 * libm::cbrt(error.max(1e-3)).recip()).clamp(0.2, 2.0);
+        }
+        std::mem::swap(&mut self.dense, &mut work.dense);
+        self.factorised = None;
+        let there = self.reached.t >= end;
+        if there {
+            self.point.copy_from(&self.reached);
+        }
+        there
+    }
+
+    /// The same by a step of its own, so that algebraic relations between charges and rates hold.
+    fn shorter_step(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        time: f64,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<(), Stopped> {
+        let theta = (time - from.t) / (to.t - from.t);
+        self.point.t = time;
+        if theta < SHORT {
+            let line = |out: &mut [f64], from: &[f64], to: &[f64]| {
+                for (out, (from, to)) in out.iter_mut().zip(from.iter().zip(to)) {
+                    *out = from + theta * (to - from);
+                }
+            };
+            line(&mut self.point.x, &from.x, &to.x);
+            line(&mut self.point.q, &from.q, &to.q);
+            line(&mut self.point.w, &from.w, &to.w);
+            return Ok(());
+        }
+        match trbdf2::step(network, from, &mut self.point, weights, work) {
+            Ok(_) => Ok(()),
+            Err(cut) => Err(Stopped::Values(time, cut)),
+        }
+    }
+
+    /// Corrects the unknowns of `self.point` so that they belong to its charges, unless they are to be left `as_is`. Says
+    /// whether they do as far as could be.
+    pub fn finish_point(
+        &mut self,
+        network: &mut Network,
+        time: f64,
+        as_is: bool,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<bool, Stopped> {
+        self.point.t = time;
+        if as_is {
+            return Ok(true);
+        }
+        work.x.copy_from_slice(&self.point.x);
+        work.w.copy_from_slice(&self.point.w);
+        let targets = std::mem::take(&mut self.point.q);
+        let corrected = self.correct(network, &targets, time, weights, work);
+        self.point.q = targets;
+        let belong = corrected.map_err(|cut| Stopped::Values(time, cut))?;
+        if belong {
+            self.point.x.copy_from_slice(&work.x);
+            self.point.w.copy_from_slice(&work.w);
+        }
+        Ok(belong)
+    }
+
+    /// Whether the correction came to its end; an error where there are no finite values.
+    fn correct(
+        &mut self,
+        network: &mut Network,
+        targets: &[f64],
+        time: f64,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<bool, Cut> {
+        let Work { x, w, q, scratch, .. } = work;
+        let held = &self.held;
+        let frozen = Frozen { t: time, held, targets, floors: weights, most: 1, prime: false };
+        if self.factorised.is_none() {
+            self.factorised = Some(network.factorise_frozen(held).is_ok());
+        }
+        for iteration in 0..MOST_CORRECTIONS {
+            if self.factorised != Some(true) || iteration >= 2 {
+                // The slopes of the step's start no longer serve.
+                network.linearise(x, time, false);
+                if network.factorise_frozen(held).is_err() {
+                    self.factorised = None;
+                    return self.keep_guess(network, time, work);
+                }
+                self.factorised = Some(true);
+            }
+            let update = correct_frozen(network, &frozen, x, w, q, scratch);
+            if update <= 0.02 || (iteration == 0 && network.system.is_linear()) {
+                return Ok(true);
+            }
+            if !update.is_finite() {
+                break;
+            }
+        }
+        self.factorised = None;
+        self.keep_guess(network, time, work)
+    }
+
+    /// The corrections may have led astray: what was interpolated stands, where the laws have values there.
+    fn keep_guess(&self, network: &mut Network, time: f64, work: &mut Work) -> Result<bool, Cut> {
+        network.evaluate(&self.point.x, time);
+        network.residual(&self.point.x, time, &mut work.right);
+        if work.right.iter().all(|r| r.is_finite()) {
+            return Ok(false);
+        }
+        Err(Cut::NonFinite { device: network.non_finite_law() })
+    }
+}
+
+/// Whether parabolas of the unknowns miss the equations between the ends of a step by more than the step may err: a diode
+/// that begins or ends to conduct bends the solution there, and only the values at the stages are tested.
+fn is_rough(
+    network: &mut Network,
+    from: &State,
+    to: &State,
+    weights: &[f64],
+    work: &mut Work,
+) -> bool {
+    /// Halfway between the stages, about.
+    const ASKED: [f64; 2] = [0.3, 0.8];
+    /// In units of what a step may err by.
+    const MOST: f64 = 2.0;
+    if !work.dense.by_unknowns {
+        return false;
+    }
+    let h = to.t - from.t;
+    ASKED.iter().any(|theta| {
+        let time = from.t + theta * h;
+        work.dense.unknowns(*theta, from, to, &mut work.x);
+        network.linearise(&work.x, time, false);
+        network.residual(&work.x, time, &mut work.right);
+        for (k, slope) in work.error.iter_mut().enumerate() {
+            *slope = to.x[k] - from.x[k] + (1.0 - 2.0 * theta) * work.dense.x[0][k];
+        }
+        work.sum.fill(0.0);
+        network.add_charge_change(1.0 / h, &work.error, &mut work.sum);
+        network.system.rates.add_transposed(1.0, &work.sum, &mut work.right);
+        network.solve_dynamic(&mut work.right);
+        methods::weighted(&work.right, weights) > MOST
+    })
+}
