@@ -130,13 +130,8 @@ impl<'a> Rows<'a> {
             }
             self.next += 1;
             self.inside.point.copy_from(state);
-            self.inside.finish_point(
-                network,
-                due,
-                index2 || !network.system.output_rates,
-                weights,
-                work,
-            )?;
+            // At the state's own time: past a corner the segment that ends there means nothing.
+            self.inside.finish_point(network, time, index2, weights, work)?;
             self.write(network, due)?;
         }
     }

@@ -253,7 +253,7 @@ impl<'a> Run<'a> {
             self.check_interrupt()?;
             let (corner, event) = self.advance()?;
             if self.settings.jumps == Side::Before {
-                self.rows_as_arrived()?;
+                self.rows_at_state()?;
             }
             if let Some(mode) = event {
                 self.pass_event(mode)?;

@@ -69,7 +69,7 @@ impl Run<'_> {
         self.rows_due(as_is)
     }
 
-    /// The same with the unknowns as they stand, before a corner or event is passed.
+    /// The same with the unknowns as they stand.
     pub(super) fn rows_as_arrived(&mut self) -> Result<(), Failure> {
         self.rows_due(true)
     }
