@@ -199,6 +199,8 @@ const IGNORED: &[&str] = &[
     "opts",
     "nomod",
     "temp",
+    "smoothbsrc",
+    "rcconst",
     "tnom",
     "gmin",
     "maxord",

@@ -1,4 +1,5 @@
-//! Resistor: v = R·i. R in Ω, of either sign; R = 0 is a wire, a voltage source of 0 V with a branch.
+//! Resistor: v = R·i. R in Ω, of either sign; one that is 0 or next to it has a branch, since the difference of its
+//! voltages would be rounding: 0 is a wire.
 //!
 //! Source: L. W. Nagel, SPICE2, UCB/ERL M520, 1975, section 3.
 
@@ -12,12 +13,15 @@ pub const ROW: Row = Row {
     letters: "R",
     equation: "v = R i",
     needs: |kind| match kind {
-        DeviceKind::Resistor { resistance } if *resistance == 0.0 => Needs::BRANCH,
+        DeviceKind::Resistor { resistance } if resistance.abs() < WIRE => Needs::BRANCH,
         _ => Needs { branch: Branch::Never, ..Needs::NOTHING },
     },
     stamp,
     current,
 };
+
+/// Below this a resistor is a wire, Ω.
+const WIRE: f64 = 1e-15;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Resistor { resistance } = stamper.device(id).kind else { return };
@@ -29,6 +33,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         Some(branch) => {
             stamper.through(id, branch);
             stamper.difference(Some(branch), ends, 1.0);
+            stamper.conductance(Some(branch), Some(branch), -resistance);
         }
         None => {
             let [a, b] = ends;

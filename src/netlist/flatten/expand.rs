@@ -45,6 +45,8 @@ pub struct Flat<'n> {
     pub temperature: f64,
     /// See there.
     pub nominal_temperature: f64,
+    /// The time constant in s that voltages follow their laws with.
+    pub following: Option<f64>,
     /// What laws speak of and is no device of a card; numbered after those.
     pub quantities: RefCell<Vec<circuit::Device>>,
 }
@@ -87,6 +89,7 @@ pub fn expand_with<'n>(
         times: Times::default(),
         temperature: ROOM,
         nominal_temperature: ROOM,
+        following: None,
         quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());

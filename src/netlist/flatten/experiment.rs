@@ -90,6 +90,24 @@ pub fn temperatures(flat: &mut Flat, options: &[(String, String)], d: &mut Vec<D
     }
 }
 
+/// The time constant in s that options let the laws of voltage sources be followed with; the last of several wins.
+pub fn smoothing(options: &[(String, String)], d: &mut Vec<Diagnostic>) -> Option<f64> {
+    let last = |name: &str| options.iter().rev().find(|(key, _)| key == name).map(|(_, text)| text);
+    if last("smoothbsrc").is_none_or(|text| text == "0") {
+        return None;
+    }
+    let Some(text) = last("rcconst") else { return Some(FOLLOWING) };
+    let constant = text.parse().ok().filter(|constant| *constant > 0.0);
+    if constant.is_none() {
+        let message = format!("`rcconst={text}` is no time in seconds");
+        d.push(Diagnostic::error("E0766", Span::NONE, message));
+    }
+    constant
+}
+
+/// Xyce's default of `rcconst`, s.
+const FOLLOWING: f64 = 1e-9;
+
 /// Output columns (those of the header, else those of `.save` and `.print`), and `.ic` values.
 pub fn readings(
     flat: &Flat,

@@ -164,7 +164,8 @@ fn kind(
             DeviceKind::Line { impedance: impedance?, delay: delay?, initial: values }
         }
         Element::BehaviouralVoltage { law } => {
-            DeviceKind::BehaviouralVoltage { law: lookup.law(scope, law, d)? }
+            let law = lookup.law(scope, law, d)?;
+            DeviceKind::BehaviouralVoltage { law: lookup.followed(law, &pending.nodes) }
         }
         Element::BehaviouralCurrent { law } => {
             DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }

@@ -59,6 +59,7 @@ pub fn flatten_with(
     if let Some(temperature) = variation.temperature {
         flat.temperature = temperature;
     }
+    flat.following = experiment::smoothing(&options, diagnostics);
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
     let starts = guess::follow(&devices, flat.nodes.len(), &guesses);

@@ -4,9 +4,9 @@ use super::scope::ScopeId;
 use super::sources;
 use super::transfer;
 use super::values::Lookup;
-use crate::circuit::{self, Device, DeviceId, DeviceKind, Quantity};
+use crate::circuit::{self, Device, DeviceId, DeviceKind, NodeId, Quantity};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Curve, Node};
+use crate::expr::{Binary, Curve, Node};
 use crate::netlist::{Expr, Operator};
 use crate::source::Span;
 
@@ -83,6 +83,15 @@ impl Lookup<'_, '_> {
             Operator::Transfer => transfer::realise(self, id, law, arguments.get(1)?, span, d)?,
             Operator::Waveform(_) | Operator::Table => return None,
         })
+    }
+
+    /// The law of a voltage that follows what it is told with a time constant: v = law − τ·dv/dt.
+    pub fn followed(&self, law: circuit::Expr, nodes: &[NodeId]) -> circuit::Expr {
+        let (Some(constant), [a, b]) = (self.flat.following, nodes) else { return law };
+        let span = law.span;
+        let own = circuit::Expr::leaf(circuit::Leaf::Voltage(*a, *b));
+        let rate = self.quantity(Quantity::Derivative { law: own }, span);
+        law - circuit::Expr::number(constant).binary(Binary::Multiply, rate)
     }
 
     /// Adds a quantity; the leaf that reads it.

@@ -3,6 +3,7 @@
 use super::calls;
 use super::cursor::node_name;
 use super::functions::Calls;
+use super::linked;
 use super::number;
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
@@ -51,6 +52,9 @@ pub fn with_calls(
         d.push(parse::too_deep(place(at, at + 1)));
         return None;
     }
+    if let Some((count, from)) = polynomial_head(text) {
+        return polynomial(text, count, from, names, dialect, reading, calls, (file, offset), d);
+    }
     let marked = reading.colons.then(|| mark_colons(text)).flatten();
     let text = marked.as_deref().unwrap_or(text);
     let mut pairs = match Grammar::parse(Rule::whole, text) {
@@ -62,6 +66,57 @@ pub fn with_calls(
     };
     let mut language = Spice { names, spelling: dialect.spelling, reading, calls, file, offset };
     parse::expression(&mut language, pairs.next()?, d)
+}
+
+/// The number of variables, and where they begin, of `POLY(n) x … c0 c1 …`, which Xyce reads as an expression, too.
+fn polynomial_head(text: &str) -> Option<(usize, usize)> {
+    let word = text.trim_start();
+    let rest = word.get(4..).filter(|_| word[..4].eq_ignore_ascii_case("poly"))?.trim_start();
+    let inner = rest.strip_prefix('(')?;
+    let (count, behind) = inner.split_once(')')?;
+    // `poly(x, y)` would be a call.
+    let count = count.trim().parse().ok().filter(|count| *count > 0)?;
+    (!behind.trim().is_empty()).then_some((count, text.len() - behind.len()))
+}
+
+#[allow(clippy::too_many_arguments)]
+fn polynomial(
+    text: &str,
+    count: usize,
+    from: usize,
+    names: &mut Names,
+    dialect: &Dialect,
+    reading: Reading,
+    mut calls: Option<&mut Calls>,
+    (file, offset): (FileId, usize),
+    d: &mut Vec<Diagnostic>,
+) -> Option<Expr> {
+    let mut terms = vec![];
+    let (mut depth, mut begin) = (0i32, from);
+    for (at, byte) in text.bytes().enumerate().skip(from).chain([(text.len(), b' ')]) {
+        match byte {
+            b'(' | b'{' => depth += 1,
+            b')' | b'}' => depth -= 1,
+            b' ' | b'\t' | b',' if depth <= 0 => {
+                if begin < at {
+                    let place = (file, offset + begin);
+                    let own = calls.as_deref_mut();
+                    let term = &text[begin..at];
+                    terms.push(with_calls(term, names, dialect, reading, own, place, d)?);
+                }
+                begin = at + 1;
+            }
+            _ => {}
+        }
+    }
+    let span = Span::new(file, offset, offset + text.len());
+    if terms.len() <= count || terms.len() > linked::MOST {
+        let message = "POLY(n) takes n variables, and coefficients behind them";
+        d.push(Diagnostic::error("E0771", span, message));
+        return None;
+    }
+    let coefficients = terms.split_off(count);
+    Some(linked::polynomial_of(coefficients, &terms, span))
 }
 
 /// What pest found, in the words of netlists.

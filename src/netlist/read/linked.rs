@@ -16,7 +16,7 @@ pub enum Linked {
 }
 
 /// Variables of a polynomial, and coefficients, at most.
-const MOST: usize = 1000;
+pub const MOST: usize = 1000;
 
 /// The rest of a card of E or G.
 pub fn linked(reader: &mut Reader, cursor: &mut Cursor) -> Option<Linked> {
@@ -239,8 +239,7 @@ fn variables(reader: &mut Reader, cursor: &mut Cursor, from: usize) -> Option<us
     }
 }
 
-/// The coefficients of a polynomial, in SPICE's order: 1, x, y, x², x·y, y², x³, x²·y and so on. One coefficient of one
-/// variable is that of x.
+/// The coefficients of a polynomial, in SPICE's order: 1, x, y, x², x·y, y², x³, x²·y and so on.
 fn polynomial(reader: &mut Reader, cursor: &mut Cursor, inputs: &[Expr]) -> Option<Expr> {
     let from = cursor.at;
     let mut coefficients = vec![];
@@ -258,11 +257,16 @@ fn polynomial(reader: &mut Reader, cursor: &mut Cursor, inputs: &[Expr]) -> Opti
         reader.missing(cursor, "the first coefficient");
         return None;
     }
+    let span = cursor.span(reader, from, cursor.at);
+    Some(polynomial_of(coefficients, inputs, span))
+}
+
+/// A polynomial. One coefficient of one variable is that of x.
+pub fn polynomial_of(mut coefficients: Vec<Expr>, inputs: &[Expr], span: Span) -> Expr {
     if coefficients.len() == 1 && inputs.len() == 1 {
         coefficients.insert(0, Expr::number(0.0));
     }
-    let span = cursor.span(reader, from, cursor.at);
-    Some(sum(coefficients, inputs, span))
+    sum(coefficients, inputs, span)
 }
 
 fn sum(coefficients: Vec<Expr>, inputs: &[Expr], span: Span) -> Expr {

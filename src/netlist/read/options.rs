@@ -40,6 +40,8 @@ const KEYS: &[(&str, &str, &[&str])] = &[
     ("device", "temp", &["temp"]),
     ("device", "tnom", &["tnom"]),
     ("device", "gmin", &["gmin"]),
+    ("device", "smoothbsrc", &["smoothbsrc"]),
+    ("device", "rcconst", &["rcconst"]),
     ("output", "initial_interval", &["initial_interval"]),
 ];
 
