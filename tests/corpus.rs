@@ -68,7 +68,9 @@ fn replay() {
             ("deck", targets::deck),
         ] {
             let took = time(|| target(&data));
-            assert!(took < Duration::from_secs(1), "{name} {}: {took:?}", path.display());
+            // A deck may expand to as many devices as there may be, in each dialect.
+            let most = if name == "deck" { 60 } else { 1 };
+            assert!(took < Duration::from_secs(most), "{name} {}: {took:?}", path.display());
         }
     }
     if let Some(memory) = most_memory() {

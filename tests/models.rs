@@ -364,11 +364,14 @@ fn netlists_read_back_give_the_run_of_their_model() {
     for model in shipped() {
         // The golden netlists are what translation writes: another test holds them to that.
         let name = format!("netlists/{model}.cir");
-        let (mut back, _) = run_text(&name, &file(&name), &Overrides::default())
+        let text = file(&name);
+        let (mut back, _) = run_text(&name, &text, &Overrides::default())
             .unwrap_or_else(|diagnostics| panic!("{model}: {diagnostics:#?}"));
         let trace = run(&model, &Overrides::default());
         back.units.clone_from(&trace.units);
-        agree(&model, &back, &trace, 1e-12);
+        // Subcircuits put devices into another order, which rounding shows.
+        let tolerance = if text.contains(".subckt") { 1e-9 } else { 1e-12 };
+        agree(&model, &back, &trace, tolerance);
     }
 }
 

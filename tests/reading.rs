@@ -194,7 +194,8 @@ fn parameters_that_change_stand_in_laws() {
     let found = run_file(&at(folder.path(), "deck.cir"), &Overrides::default()).unwrap();
     // At 1 s: x = 2, v(1) = 1 + 1 + 2, y = 6.
     assert!((found["v(1)"] - 4.0).abs() < 1e-9 && (found["v(2)"] - 12.0).abs() < 1e-9, "{found:?}");
-    let wrong = deck.replace("r2 2 0 1", "c2 2 0 {x}");
+    // An initial value is a number.
+    let wrong = deck.replace("r2 2 0 1", "c2 2 0 1u ic={x}");
     std::fs::write(folder.path().join("wrong.cir"), wrong).unwrap();
     let said = run_file(&at(folder.path(), "wrong.cir"), &Overrides::default()).unwrap_err();
     assert!(said.iter().any(|said| said.starts_with("E0732")), "{said:?}");
