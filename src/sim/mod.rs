@@ -40,7 +40,7 @@ pub use compile::compile;
 pub use explain::{Failure, FailureKind};
 pub use linearise::Linear;
 pub use methods::{METHODS, Method};
-pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Tolerance};
+pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Side, Tolerance};
 pub use statistics::{Rejected, Statistics};
 pub use step::{OperatingPoint, operating_point, transient};
 pub use system::System;
