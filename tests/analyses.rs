@@ -201,7 +201,6 @@ fn what_makes_no_sense_is_said() {
         (".dc v1 0", "E0703"),
         (".op\n.step r1 1 2 1p", "E0789"),
         (".noise v(a) v1 dec 1 1 10", "E0702"),
-        (".pz a 0 a 0 vol pz", "E0702"),
     ] {
         assert!(errors(&format!("v1 a 0 1\nr1 a 0 1k\n{card}")).contains(&code), "{card}");
     }

@@ -399,6 +399,42 @@ pub enum Analysis {
         output: Output,
         source: DeviceId,
     },
+    /// Poles and zeros from a pair of nodes to another.
+    PoleZero {
+        input: [NodeId; 2],
+        output: [NodeId; 2],
+        drive: Drive,
+        roots: Roots,
+    },
+}
+
+/// What an input is driven by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Drive {
+    Voltage,
+    Current,
+}
+
+/// Which roots of a transfer function are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Roots {
+    Poles,
+    Zeros,
+    Both,
+}
+
+impl Roots {
+    /// Whether poles are.
+    pub fn poles(self) -> bool {
+        self != Roots::Zeros
+    }
+
+    /// Whether zeros are.
+    pub fn zeros(self) -> bool {
+        self != Roots::Poles
+    }
 }
 
 impl Analysis {
@@ -410,6 +446,7 @@ impl Analysis {
             Analysis::Dc { .. } => "dc",
             Analysis::Ac { .. } => "ac",
             Analysis::Transfer { .. } => "tf",
+            Analysis::PoleZero { .. } => "pz",
         }
     }
 }

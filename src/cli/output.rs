@@ -5,6 +5,7 @@ use super::table::Table;
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
 use crate::trace::formats::{self, Format, Heading};
+use crate::trace::runs::NUMBER;
 use crate::trace::{Sink, Trace, csv, raw};
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
@@ -269,7 +270,8 @@ impl Output {
                 (format.write)(&trace, &heading, &mut io::stdout().lock()).map(|()| None)
             }
             Kind::Table(trace) => {
-                let text = summary(&trace).to_text();
+                let list = trace.names.iter().any(|name| name == NUMBER);
+                let text = if list { rows(&trace) } else { summary(&trace) }.to_text();
                 let written = io::stdout().lock().write_all(text.as_bytes());
                 session
                     .remark("hint: -o out.csv keeps every row; --list names what can be observed");
@@ -295,6 +297,24 @@ impl Sink for Output {
             Kind::Whole(trace, _, _) | Kind::Table(trace) => trace.row(values),
         }
     }
+}
+
+/// The rows of a list.
+fn rows(trace: &Trace) -> Table {
+    let head = trace.names.iter().zip(&trace.units).map(|(name, unit)| match unit.as_str() {
+        "" => name.clone(),
+        unit => format!("{name} [{unit}]"),
+    });
+    let head: Vec<String> = head.collect();
+    let mut table = Table::new(&head.iter().map(String::as_str).collect::<Vec<_>>());
+    for row in 0..trace.rows() {
+        let cell = |column: &Vec<f64>| match column[row] {
+            value if value.is_nan() => "-".to_string(),
+            value => super::table::short(value),
+        };
+        table.row(trace.columns.iter().map(cell));
+    }
+    table
 }
 
 /// Name, unit, first, last, least and greatest value of each column.

@@ -218,6 +218,11 @@ impl<T: Field> Lu<T> {
         (&self.rows, &self.columns)
     }
 
+    /// The pivots in the order of elimination, those of the scaled matrix.
+    pub fn pivots(&self) -> impl Iterator<Item = T> + '_ {
+        self.diagonal.iter().map(|at| self.factors[*at as usize])
+    }
+
     /// Works out all places for an elimination.
     fn lay_out(
         pattern: &Pattern,

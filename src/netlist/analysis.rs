@@ -1,6 +1,7 @@
 //! What cards ask to be computed, beyond `.op` and `.tran`, and over which values.
 
 use super::{Expr, Name, Names};
+use crate::circuit::{Drive, Roots};
 use crate::source::Span;
 
 /// An analysis.
@@ -16,6 +17,17 @@ pub enum Analysis {
         output: (String, Expr),
         /// The independent source.
         source: Name,
+    },
+    /// `.pz in+ in- out+ out- cur|vol pol|zer|pz`.
+    PoleZero {
+        /// The pair of nodes that is driven.
+        input: [Name; 2],
+        /// The pair between which the output is taken.
+        output: [Name; 2],
+        /// By what it is driven.
+        drive: Drive,
+        /// What is asked for.
+        roots: Roots,
     },
 }
 
@@ -77,6 +89,7 @@ pub enum Print {
     Ac,
     OperatingPoint,
     Transfer,
+    PoleZero,
     /// `.save`, and `.probe`: of every analysis.
     Any,
 }
@@ -90,6 +103,7 @@ impl Print {
             Print::Ac => "ac",
             Print::OperatingPoint => "op",
             Print::Transfer => "tf",
+            Print::PoleZero => "pz",
         }
     }
 }
@@ -115,6 +129,22 @@ impl Spelling<'_> {
             }
             Analysis::Transfer { output, source } => {
                 vec![word(".tf"), output.0.clone(), self.name(*source)]
+            }
+            Analysis::PoleZero { input, output, drive, roots } => {
+                let drive = match drive {
+                    Drive::Voltage => "vol",
+                    Drive::Current => "cur",
+                };
+                let roots = match roots {
+                    Roots::Poles => "pol",
+                    Roots::Zeros => "zer",
+                    Roots::Both => "pz",
+                };
+                let nodes = input.iter().chain(output).map(|node| self.name(*node));
+                std::iter::once(word(".pz"))
+                    .chain(nodes)
+                    .chain([word(drive), word(roots)])
+                    .collect()
             }
         }
     }
@@ -181,6 +211,7 @@ pub(super) fn expressions_mut(analysis: &mut Analysis, visit: &mut dyn FnMut(&mu
         Analysis::Dc(sweeps) => sweeps_mut(sweeps, visit),
         Analysis::Ac(points) => points_mut(points, visit),
         Analysis::Transfer { output, .. } => visit(&mut output.1),
+        Analysis::PoleZero { .. } => {}
     }
 }
 

@@ -4,7 +4,7 @@ use super::explain::{Failure, FailureKind};
 use super::settings::Settings;
 use super::statistics::Statistics;
 use super::system::System;
-use super::{ac, dc, step, transfer};
+use super::{ac, dc, poles, step, transfer};
 use crate::circuit::stamps::Stamps;
 use crate::circuit::{Analysis, Axis, Circuit};
 use crate::diagnostic::Diagnostic;
@@ -84,6 +84,13 @@ pub const ANALYSES: &[Row] = &[
             names.map(|(name, unit)| (name.to_string(), unit)).to_vec()
         },
         run: transfer::transfer,
+    },
+    Row {
+        name: "pz",
+        card: ".pz in+ in- out+ out- cur|vol pol|zer|pz",
+        about: "poles and zeros, linearised at the operating point",
+        columns: |analysis, _, _| poles::columns(analysis),
+        run: poles::poles,
     },
     Row {
         name: "tran",

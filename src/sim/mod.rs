@@ -21,6 +21,7 @@ mod newton;
 mod op;
 mod output;
 mod phasor;
+mod poles;
 mod reduce;
 mod remarks;
 mod search;

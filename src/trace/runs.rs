@@ -6,6 +6,9 @@ use std::ops::Range;
 /// The header of the column that counts runs.
 pub const STEP: &str = "step";
 
+/// The name of the column that numbers the members of a list, which has no abscissa.
+pub const NUMBER: &str = "number";
+
 impl Trace {
     /// Whether the first column counts runs.
     pub fn is_stepped(&self) -> bool {

@@ -46,6 +46,23 @@ pub fn analysis(
             }
             Some(circuit::Analysis::Transfer { output: output?, source: device })
         }
+        Analysis::PoleZero { input, output, drive, roots } => {
+            let mut pair = |names: &[Name; 2]| {
+                let [a, b] = names.map(|name| lookup.node(TOP, name, span, d));
+                Some([a?, b?])
+            };
+            let (input, output) = (pair(input), pair(output));
+            let (input, output) = (input?, output?);
+            if let Some(which) =
+                [(input, "input"), (output, "output")].iter().find(|(p, _)| p[0] == p[1])
+            {
+                let message = format!("both nodes of the {} are one", which.1);
+                let help = "`.pz in 0 out 0 vol pz`: two nodes of the input, two of the output";
+                d.push(Diagnostic::error("E0787", span, message).help(help));
+                return None;
+            }
+            Some(circuit::Analysis::PoleZero { input, output, drive: *drive, roots: *roots })
+        }
     }
 }
 

@@ -200,6 +200,7 @@ fn print_of(analysis: &Analysis) -> Print {
         Analysis::Dc { .. } => Print::Dc,
         Analysis::Ac { .. } => Print::Ac,
         Analysis::Transfer { .. } => Print::Transfer,
+        Analysis::PoleZero { .. } => Print::PoleZero,
     }
 }
 

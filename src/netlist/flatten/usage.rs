@@ -2,6 +2,7 @@
 
 use super::values::NEAR;
 use crate::diagnostic::Diagnostic;
+use crate::netlist::analysis::Analysis;
 use crate::netlist::header::Header;
 use crate::netlist::parts::every_leaf;
 use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist, read};
@@ -132,6 +133,10 @@ impl Usage {
                     }
                     self.expr(expr);
                 }),
+                CardKind::Analysis(Analysis::Transfer { output, .. }) => self.expr(&output.1),
+                CardKind::Analysis(Analysis::PoleZero { input, output, .. }) => {
+                    input.iter().chain(output).for_each(|node| self.count(*node));
+                }
                 CardKind::Measure(measure) => {
                     read::measure::expressions(&measure.kind, &mut |expr| self.expr(expr));
                 }

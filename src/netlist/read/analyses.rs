@@ -5,8 +5,11 @@
 //! | `.dc` | `src from to by …`, `[lin|dec|oct] src from to n …`, `src list v v … …`, `data=table` |
 //! | `.step` | the same; a word `param` before the name is LTspice's |
 //! | `.ac` | `lin|dec|oct n from to`, `list f f …`, `data=table` |
+//! | `.tf` | `v(out) src` |
+//! | `.pz` | `in+ in- out+ out- cur|vol pol|zer|pz` |
 
 use super::{Cursor, Reader};
+use crate::circuit::{Drive, Roots};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::analysis::{Analysis, Data, Points, Print, Sweep};
 use crate::netlist::{CardKind, Expr, Leaf, Name, Part};
@@ -215,6 +218,27 @@ pub fn transfer(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     Some(CardKind::Analysis(Analysis::Transfer { output, source }))
 }
 
+/// The word after which `.pz` counts.
+const PZ: &str = "`.pz in+ in- out+ out- cur|vol pol|zer|pz`";
+
+/// `.pz in+ in- out+ out- cur|vol pol|zer|pz`.
+pub fn pole_zero(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
+    let mut node = |what: &str| reader.node(cursor, &format!("{what} of {PZ}"));
+    let input = [node("the first node")?, node("the second node")?];
+    let output = [node("the third node")?, node("the fourth node")?];
+    let mut word = |known: &[&str]| {
+        let found = known.iter().position(|word| word.eq_ignore_ascii_case(cursor.next_word()));
+        match found {
+            Some(_) => drop(cursor.word()),
+            None => reader.missing(cursor, &format!("`{}` of {PZ}", known.join("` or `"))),
+        }
+        found
+    };
+    let drive = [Drive::Voltage, Drive::Current][word(&["vol", "cur"])?];
+    let roots = [Roots::Poles, Roots::Zeros, Roots::Both][word(&["pol", "zer", "pz"])?];
+    Some(CardKind::Analysis(Analysis::PoleZero { input, output, drive, roots }))
+}
+
 /// One output: v(a), v(a, b), i(device).
 fn output(reader: &mut Reader, cursor: &mut Cursor) -> Option<(String, Expr)> {
     cursor.blanks();
@@ -268,6 +292,7 @@ pub fn print(word: &str) -> Option<Print> {
         "ac" => Print::Ac,
         "op" => Print::OperatingPoint,
         "tf" => Print::Transfer,
+        "pz" => Print::PoleZero,
         _ => return None,
     })
 }

@@ -51,7 +51,7 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("dc", Read(analyses::dc)),
     ("ac", Read(analyses::ac)),
     ("tf", Read(analyses::transfer)),
-    ("pz", Refused(ANALYSIS)),
+    ("pz", Read(analyses::pole_zero)),
     ("sens", Refused(ANALYSIS)),
     ("step", Read(analyses::step)),
     ("data", Read(analyses::data)),
