@@ -10,6 +10,7 @@ pub mod stamps;
 
 use crate::expr;
 use crate::source::Span;
+use crate::trace::fourier::Request;
 use crate::trace::measure::Measure;
 pub use sweep::{Axis, Points};
 pub use waveform::Waveform;
@@ -476,6 +477,8 @@ pub struct Circuit {
     pub outputs: Vec<Output>,
     /// What is measured, over the columns of `watched`.
     pub measures: Vec<Measure>,
+    /// Whose harmonics are told, over the same columns.
+    pub harmonics: Vec<Request>,
     /// Columns that are measured and not written; they come after the others.
     pub watched: Vec<Expr>,
     /// `.options` and header options as (key, value), later ones win.

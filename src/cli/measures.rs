@@ -1,11 +1,13 @@
-//! Measures of a run: taken while its rows stream by, told as a table on stderr, written to a file.
+//! Measures and harmonics of a run: taken while its rows stream by, told as a table on stderr, written to a file.
 
+use super::fourier::Harmonics;
 use super::output::write_text;
 use super::session::{Exit, MessageFormat, Session};
 use super::table::Table;
 use crate::diagnostic::Diagnostic;
 use crate::source::Span;
 use crate::trace::formats::{self, Heading};
+use crate::trace::fourier;
 use crate::trace::measure::{Measure, Measures, Outcome};
 use crate::trace::runs::STEP;
 use crate::trace::{Sink, Trace};
@@ -32,9 +34,24 @@ pub struct Measuring<'a> {
     watched: Vec<(usize, Option<usize>)>,
     /// Whether rows stand at times of their own, so that only those of steps are measured.
     times: bool,
-    taking: Option<(f64, Measures)>,
+    taking: Option<(f64, Measures, Vec<fourier::Taking>)>,
     values: Vec<f64>,
     done: Vec<Measured>,
+    /// Whose harmonics are told, and where their period ends.
+    harmonics: Vec<fourier::Request>,
+    stop: f64,
+    told: Vec<Harmonics>,
+}
+
+/// What is taken from the rows of a run.
+#[derive(Clone, Copy)]
+pub struct Taken<'c> {
+    /// `.measure`.
+    pub measures: &'c [Measure],
+    /// `.four`; none where the run is not one over time.
+    pub harmonics: &'c [fourier::Request],
+    /// When the run ends.
+    pub stop: f64,
 }
 
 /// How the header of a watched column begins.
@@ -49,7 +66,7 @@ impl<'a> Measuring<'a> {
     /// Before a sink; `names` are those of all columns, `times` says whether rows stand at times of their own.
     pub fn new(
         to: &'a mut dyn Sink,
-        list: &[Measure],
+        taken: Taken,
         analysis: &'a str,
         names: &[String],
         times: bool,
@@ -63,21 +80,40 @@ impl<'a> Measuring<'a> {
             at += 1 + usize::from(pair);
         }
         let abscissa = usize::from(names.first().is_some_and(|name| name == STEP));
-        let (list, taking, values, done) = (list.to_vec(), None, vec![], vec![]);
-        Measuring { to, list, analysis, shown, abscissa, watched, times, taking, values, done }
+        let mut measuring = Measuring {
+            to,
+            list: vec![],
+            analysis,
+            shown,
+            abscissa,
+            watched,
+            times,
+            taking: None,
+            values: vec![],
+            done: vec![],
+            harmonics: vec![],
+            stop: 0.0,
+            told: vec![],
+        };
+        measuring.follow(taken);
+        measuring
     }
 
-    /// Takes these measures from the next step on, whose parameters have other values.
-    pub fn follow(&mut self, list: &[Measure]) {
+    /// Takes this from the next step on, whose parameters have other values.
+    pub fn follow(&mut self, taken: Taken) {
         self.end();
-        self.list = list.to_vec();
+        self.list = taken.measures.to_vec();
+        self.harmonics = taken.harmonics.to_vec();
+        self.stop = taken.stop;
     }
 
     fn measure(&mut self, row: &[f64]) {
         let step = if self.abscissa > 0 { row[0] } else { 0.0 };
-        if self.taking.as_ref().is_none_or(|(own, _)| *own != step) {
+        if self.taking.as_ref().is_none_or(|(own, ..)| *own != step) {
             self.end();
-            self.taking = Some((step, Measures::new(&self.list, self.analysis)));
+            let harmonics = self.harmonics.iter();
+            let harmonics = harmonics.map(|one| fourier::Taking::new(one, self.stop)).collect();
+            self.taking = Some((step, Measures::new(&self.list, self.analysis), harmonics));
         }
         self.values.clear();
         // A phasor counts by its magnitude.
@@ -85,28 +121,35 @@ impl<'a> Measuring<'a> {
             Some(im) => row[*re].hypot(row[*im]),
             None => row[*re],
         }));
-        if let Some((_, taking)) = &mut self.taking {
+        if let Some((_, taking, harmonics)) = &mut self.taking {
             taking.row(row[self.abscissa], &self.values);
+            harmonics.iter_mut().for_each(|one| one.row(row[self.abscissa], &self.values));
         }
     }
 
     fn end(&mut self) {
-        if let Some((step, taking)) = self.taking.take() {
+        if let Some((step, taking, harmonics)) = self.taking.take() {
             let step = (self.abscissa > 0).then_some(step);
             self.done.push(Measured { step, outcomes: taking.finish() });
+            let told = harmonics.into_iter().zip(&self.harmonics).map(|(one, request)| Harmonics {
+                step,
+                span: request.span,
+                found: one.finish(),
+            });
+            self.told.extend(told);
         }
     }
 
-    /// What was measured.
-    pub fn finish(mut self) -> Vec<Measured> {
+    /// What was measured, and the harmonics.
+    pub fn finish(mut self) -> (Vec<Measured>, Vec<Harmonics>) {
         self.end();
-        self.done
+        (self.done, self.told)
     }
 }
 
 impl Sink for Measuring<'_> {
     fn row(&mut self, values: &[f64]) -> io::Result<()> {
-        if !self.times && !self.list.is_empty() {
+        if !self.times && !(self.list.is_empty() && self.harmonics.is_empty()) {
             self.measure(values);
         }
         self.to.row(&values[..self.shown.min(values.len())])

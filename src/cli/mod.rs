@@ -4,6 +4,7 @@ pub mod session;
 pub mod output;
 pub mod table;
 pub mod measures;
+pub mod fourier;
 pub mod emit;
 pub mod flags;
 pub mod watch;

@@ -1,6 +1,7 @@
 //! A circuit that is ready to run: which analysis, over which steps, with which columns.
 
-use super::measures::{self, Measured, Measuring};
+use super::fourier::Harmonics;
+use super::measures::{self, Measured, Measuring, Taken};
 use super::pipeline::{self, Deck, Language, Units};
 use crate::bond::elaborate::Overrides;
 use crate::circuit::stamps::{self, Stamps};
@@ -177,6 +178,11 @@ pub fn ready(
         let warning = Diagnostic::warning("W0792", other.span, message);
         d.push(warning.help("pick the analysis with --analysis"));
     }
+    if let Some(other) = circuit.harmonics.first().filter(|_| settings.is_none()) {
+        let message = format!("there are no harmonics: `{own}` is run");
+        let warning = Diagnostic::warning("W0793", other.span, message);
+        d.push(warning.help("pick the run over time with --analysis tran"));
+    }
     Some(Run {
         all,
         title: circuit.title.clone(),
@@ -233,12 +239,14 @@ impl Run {
     }
 
     /// Runs, and sends rows to a sink; also tells what was measured.
-    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Vec<Measured>) {
+    pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Taking) {
         let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
         let own = self.analysis.name();
-        let mut measuring = Measuring::new(sink, &self.circuit.measures, own, &self.all, times);
+        let taken = taken(&self.circuit, self.settings.as_ref());
+        let mut measuring = Measuring::new(sink, taken, own, &self.all, times);
         let result = self.analyse(&mut measuring);
-        (result, measuring.finish())
+        let (measured, harmonics) = measuring.finish();
+        (result, Taking { measured, harmonics })
     }
 
     fn analyse(&self, sink: &mut Measuring) -> Result<Statistics, Failure> {
@@ -287,7 +295,7 @@ impl Run {
             let Settings { rows, interrupt, progress, .. } = settings;
             settings = Settings { rows, interrupt, progress, ..own };
         }
-        to.follow(&circuit.measures);
+        to.follow(taken(&circuit, self.settings.is_some().then_some(&settings)));
         let mut sink = Stepped { to, row: vec![step as f64] };
         self.one(&circuit, &stamps, &system, &settings, pairs, &mut sink)
     }
@@ -330,6 +338,23 @@ impl Run {
     /// An empty trace with this run's columns.
     pub fn trace(&self) -> Trace {
         Trace::new(self.names.clone(), self.units.clone())
+    }
+}
+
+/// What was taken from the rows of a run.
+pub struct Taking {
+    /// Measures.
+    pub measured: Vec<Measured>,
+    /// Harmonics.
+    pub harmonics: Vec<Harmonics>,
+}
+
+/// What a circuit wants to be taken from rows; `settings` are those of a run over time.
+fn taken<'c>(circuit: &'c Circuit, settings: Option<&Settings>) -> Taken<'c> {
+    Taken {
+        measures: &circuit.measures,
+        harmonics: if settings.is_some() { &circuit.harmonics } else { &[] },
+        stop: settings.map_or(0.0, |settings| settings.stop),
     }
 }
 

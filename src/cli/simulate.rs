@@ -2,6 +2,7 @@
 
 use super::emit::Stage;
 use super::flags::{DeckFlags, ModelFlags};
+use super::fourier;
 use super::list;
 use super::measures;
 use super::output::{Output, write_text};
@@ -58,6 +59,9 @@ pub struct Arguments {
     /// Where to write what `.measure` asks for: .csv or .json
     #[arg(long, value_name = "FILE")]
     measures: Option<String>,
+    /// Where to write the harmonics that `.four` asks for: .csv or .json
+    #[arg(long, value_name = "FILE")]
+    fourier: Option<String>,
     /// Statistics of the run on stderr
     #[arg(long, value_name = "FORM", value_parser = ["json", "text"])]
     stats: Option<String>,
@@ -128,7 +132,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     let bar = Bar::new(session.global.quiet);
     let progress = bar.clone().map(|bar| Arc::new(move |part| bar.show(part)) as Progress);
     run.watch(watch::stop_flag(), progress);
-    let (result, measured) = run.go_measured(&mut output);
+    let (result, taken) = run.go_measured(&mut output);
     if let Some(bar) = bar {
         bar.clear();
     }
@@ -137,7 +141,8 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
             session.say(statistics.warnings.clone());
             output.to.close(true, session)?;
             let name = run.analysis.name();
-            measures::tell(&measured, name, arguments.measures.as_deref(), session)?;
+            measures::tell(&taken.measured, name, arguments.measures.as_deref(), session)?;
+            fourier::tell(&taken.harmonics, arguments.fourier.as_deref(), session)?;
             say_statistics(arguments, &statistics, session);
             Ok(session.exit())
         }

@@ -215,6 +215,7 @@ pub const CODES: &[Code] = &[
     row("W0790", "measure is not taken", "Measures of `noise`, `fft` and `op`, and the forms DUTY, FREQ, ON_TIME, OFF_TIME and ERROR, are not computed. The run goes on without them."),
     row("W0791", "measure failed", "The run holds no such event, or none that often; or the window lies outside of it; or a measure that this one uses has failed. Its value is written as `failed`, and as no number in files."),
     row("W0792", "measure of another analysis", "The measure is taken from the rows of an analysis that is not the one run. `--analysis` picks that."),
+    row("W0793", "no harmonics", "`.four` takes the last whole period of a transient run: this one is shorter than the period, or another analysis is run."),
     row("N0719", "dialect guessed", "Nobody said what simulator the netlist is written for, and a line of it is understood by one alone, so it is read as that one reads it: suffixes, functions, signs and names differ. `--dialect` says it."),
     // -- 08: simulation
     row("E0801", "no operating point or start", "Newton's method found no values that satisfy all equations, neither directly, nor with conductances at the nodes that are taken away step by step, nor with sources turned up step by step. The message names the equation that is satisfied worst."),
@@ -231,6 +232,7 @@ pub const CODES: &[Code] = &[
     row("E0816", "measure is not understood", "`.measure tran NAME` goes on with TRIG … TARG …, FIND … WHEN … or AT=, WHEN …, DERIV … AT=, one of AVG RMS MIN MAX PP INTEG MIN_AT MAX_AT with FROM= and TO=, or PARAM='…'."),
     row("E0817", "two measures of one name", "Measures of one analysis are told apart by their names. SPICE folds case."),
     row("E0818", "measure uses a later one", "A measure may use the results of those before it, in its formula and in its limits. Change the order of the cards."),
+    row("E0819", "no frequency of a period", "`.four frequency v(out) …` takes the last period of the run, so the frequency is above 0 and finite."),
     row("E0850", "the second route cannot go on", "The graph's own equations, integrated without a circuit, need a step smaller than rounding allows: a law has a jump or a pole at this time, or the solution ends. The message names the variable that moves most."),
     row("E0851", "the second route cannot go on after a corner", "After a corner of a source no efforts and flows were found that satisfy all laws."),
     row("E0852", "the second route takes too many steps", "The run needs more steps than it is allowed; the laws or sources vary much faster than the run is long."),

@@ -120,6 +120,8 @@ pub enum CardKind {
     OperatingPoint,
     /// `.measure`.
     Measure(Measure),
+    /// `.four`: harmonics of the last period.
+    Fourier(Fourier),
     /// `.dc`, `.ac`, `.tf` and the others.
     Analysis(Analysis),
     /// `.step`: everything is run at each of these values; the first of all `.step` runs fastest.
@@ -128,6 +130,15 @@ pub enum CardKind {
     Data(Data),
     /// A whole-line comment, without the asterisk.
     Comment(String),
+}
+
+/// `.four frequency item …`.
+#[derive(Clone, Debug)]
+pub struct Fourier {
+    /// In Hz.
+    pub frequency: Expr,
+    /// Items as written and read.
+    pub items: Vec<(String, Expr)>,
 }
 
 /// `.func name(arguments) {body}`.

@@ -24,6 +24,10 @@ pub fn expressions_mut(card: &mut Card, visit: &mut dyn FnMut(&mut Expr)) {
             visit(stop);
             start.iter_mut().chain(hmax.iter_mut()).for_each(visit);
         }
+        CardKind::Fourier(fourier) => {
+            visit(&mut fourier.frequency);
+            fourier.items.iter_mut().for_each(|(_, value)| visit(value));
+        }
         CardKind::Measure(measure) => measure_mut(&mut measure.kind, visit),
         CardKind::Analysis(analysis) => super::analysis::expressions_mut(analysis, visit),
         CardKind::Step(sweeps) => super::analysis::sweeps_mut(sweeps, visit),

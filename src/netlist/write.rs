@@ -216,6 +216,13 @@ fn words(form: Form, kind: &CardKind) -> Vec<String> {
             words
         }
         CardKind::OperatingPoint => vec![word(".op")],
+        CardKind::Fourier(fourier) => {
+            let items = fourier.items.iter().map(|(text, expr)| match text.contains('.') {
+                true => form.expression(expr),
+                false => text.clone(),
+            });
+            [word(".four"), value(form, &fourier.frequency)].into_iter().chain(items).collect()
+        }
         CardKind::Measure(measure) => vec![word(".measure"), measure.text.clone()],
         CardKind::Analysis(analysis) => form.spelling().analysis(analysis),
         CardKind::Step(sweeps) => form.spelling().sweeps(".step", sweeps),

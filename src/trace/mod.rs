@@ -9,6 +9,7 @@ pub mod raw;
 pub mod json;
 pub mod vcd;
 pub mod prn;
+pub mod fourier;
 pub mod measure;
 
 /// Columns over a common abscissa.

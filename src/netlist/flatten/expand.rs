@@ -282,6 +282,7 @@ impl<'n> Expander<'n> {
                 | CardKind::Transient { .. }
                 | CardKind::OperatingPoint
                 | CardKind::Measure(_)
+                | CardKind::Fourier(_)
                 | CardKind::Analysis(_)
                 | CardKind::Step(_)
                 | CardKind::Data(_)

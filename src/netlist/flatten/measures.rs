@@ -1,24 +1,43 @@
-//! Measures: their expressions become columns that are watched, their limits numbers or follow from other measures.
+//! Measures and harmonics: their expressions become columns that are watched, their limits numbers or follow from other measures.
 
 use super::expand::Flat;
+use super::experiment;
 use super::scope::TOP;
 use super::values::Lookup;
 use crate::circuit;
 use crate::diagnostic::Diagnostic;
 use crate::expr;
-use crate::netlist::{CardKind, Expr, Leaf};
+use crate::netlist::{CardKind, Expr, Fourier, Leaf};
+use crate::source::Span;
+use crate::trace::fourier::Request;
 use crate::trace::measure::{Measure, Source, Value};
 use std::collections::{HashMap, HashSet};
 
-/// The measures of a netlist, and the columns that they watch.
-pub fn resolve(flat: &Flat, d: &mut Vec<Diagnostic>) -> (Vec<Measure>, Vec<circuit::Expr>) {
+/// What is taken from the rows of a run, and the columns that this watches.
+#[derive(Default)]
+pub struct Taken {
+    /// `.measure`.
+    pub measures: Vec<Measure>,
+    /// `.four`.
+    pub harmonics: Vec<Request>,
+    /// The columns.
+    pub watched: Vec<circuit::Expr>,
+}
+
+/// What the cards of a netlist take from rows.
+pub fn resolve(flat: &Flat, d: &mut Vec<Diagnostic>) -> Taken {
     let cards = flat.netlist.cards.iter().filter_map(|card| match &card.kind {
         CardKind::Measure(measure) => Some((measure, card.span)),
         _ => None,
     });
     let cards: Vec<_> = cards.collect();
-    if cards.is_empty() {
-        return (vec![], vec![]);
+    let fourier = flat.netlist.cards.iter().filter_map(|card| match &card.kind {
+        CardKind::Fourier(fourier) => Some((fourier, card.span)),
+        _ => None,
+    });
+    let fourier: Vec<_> = fourier.collect();
+    if cards.is_empty() && fourier.is_empty() {
+        return Taken::default();
     }
     let mut resolver = Resolver {
         lookup: Lookup::new(flat, &flat.netlist.names),
@@ -49,7 +68,9 @@ pub fn resolve(flat: &Flat, d: &mut Vec<Diagnostic>) -> (Vec<Measure>, Vec<circu
             measures.push(Measure { name, span, analysis, kind });
         }
     }
-    (measures, resolver.watched)
+    let harmonics = fourier.iter().filter_map(|(card, span)| resolver.fourier(card, *span));
+    let harmonics = harmonics.collect();
+    Taken { measures, harmonics, watched: resolver.watched }
 }
 
 struct Resolver<'a, 'f, 'n> {
@@ -66,9 +87,31 @@ struct Resolver<'a, 'f, 'n> {
 }
 
 impl Resolver<'_, '_, '_> {
+    /// A `.four` card.
+    fn fourier(&mut self, card: &Fourier, span: Span) -> Option<Request> {
+        let frequency = self.lookup.number(TOP, &card.frequency, self.d)?;
+        let mut items = vec![];
+        for (text, expr) in &card.items {
+            let output = experiment::item(&self.lookup, text, expr, self.d)?;
+            items.push((output.name, self.watch(&output.expr)));
+        }
+        if !(frequency > 0.0 && frequency.is_finite()) {
+            let message = format!("{frequency} Hz is no frequency of a period");
+            let error = Diagnostic::error("E0819", span, message);
+            self.d.push(error.help("`.four 50 v(out)`: the frequency first, in Hz and above 0"));
+            return None;
+        }
+        Some(Request { frequency, items, span })
+    }
+
     /// A column that is watched.
     fn column(&mut self, expr: &Expr) -> Option<usize> {
         let law = self.lookup.law(TOP, expr, self.d)?;
+        Some(self.watch(&law))
+    }
+
+    /// Where a law stands among the columns.
+    fn watch(&mut self, law: &circuit::Expr) -> usize {
         // Places in the text do not tell columns apart.
         let law = law.map(&mut |leaf, _| circuit::Expr::leaf(*leaf));
         let next = self.watched.len();
@@ -76,7 +119,7 @@ impl Resolver<'_, '_, '_> {
         if place == next {
             self.watched.push(law);
         }
-        Some(place)
+        place
     }
 
     /// A limit, or the formula of a measure.

@@ -24,6 +24,7 @@ use super::{Netlist, header::Header};
 use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::source::Span;
+use measures::Taken;
 pub use vary::Variation;
 
 /// The circuit of a netlist; `None` when there were errors.
@@ -64,7 +65,7 @@ pub fn flatten_with(
     let guesses = experiment::guesses(&flat, diagnostics);
     let starts = guess::follow(&devices, flat.nodes.len(), &guesses);
     let (outputs, initial) = experiment::readings(&flat, &header, run, diagnostics);
-    let (measures, watched) = measures::resolve(&flat, diagnostics);
+    let Taken { measures, harmonics, watched } = measures::resolve(&flat, diagnostics);
     devices.extend(flat.quantities.take());
     let mut circuit = Circuit {
         title: netlist.title.clone(),
@@ -78,6 +79,7 @@ pub fn flatten_with(
         steps,
         outputs,
         measures,
+        harmonics,
         watched,
         options,
         grid: header.grid,

@@ -5,7 +5,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::analysis::Analysis;
 use crate::netlist::header::Header;
 use crate::netlist::parts::every_leaf;
-use crate::netlist::{Card, CardKind, Element, Expr, Leaf, Name, Netlist, read};
+use crate::netlist::{Card, CardKind, Element, Expr, Fourier, Leaf, Name, Netlist, read};
 use crate::quantity::nearest;
 use crate::source::Span;
 
@@ -126,13 +126,15 @@ impl Usage {
                 CardKind::Global(nodes) => {
                     nodes.iter().chain(nodes).for_each(|node| self.count(*node));
                 }
-                CardKind::Save { items, .. } => items.iter().for_each(|(_, expr)| {
-                    // A bare word is a node.
-                    if let crate::expr::Node::Leaf(Leaf::Parameter(name)) = &*expr.node {
-                        self.count(*name);
-                    }
-                    self.expr(expr);
-                }),
+                CardKind::Save { items, .. } | CardKind::Fourier(Fourier { items, .. }) => {
+                    items.iter().for_each(|(_, expr)| {
+                        // A bare word is a node.
+                        if let crate::expr::Node::Leaf(Leaf::Parameter(name)) = &*expr.node {
+                            self.count(*name);
+                        }
+                        self.expr(expr);
+                    })
+                }
                 CardKind::Analysis(Analysis::Transfer { output, .. }) => self.expr(&output.1),
                 CardKind::Analysis(Analysis::PoleZero { input, output, .. }) => {
                     input.iter().chain(output).for_each(|node| self.count(*node));

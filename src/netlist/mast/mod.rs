@@ -307,6 +307,7 @@ impl<'a> Writer<'a> {
             | CardKind::Transient { .. }
             | CardKind::OperatingPoint
             | CardKind::Measure(_)
+            | CardKind::Fourier(_)
             | CardKind::Analysis(_)
             | CardKind::Step(_)
             | CardKind::Data(_) => {}

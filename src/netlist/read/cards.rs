@@ -58,7 +58,7 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("enddata", Read(|_, _| None)),
     ("plot", Skipped(RESULT)),
     ("probe", Skipped(RESULT)),
-    ("four", Skipped(RESULT)),
+    ("four", Read(super::fourier::fourier)),
     ("meas", Read(super::measure::measure)),
     ("measure", Read(super::measure::measure)),
     ("width", Skipped("it lays out another simulator's print")),
@@ -421,6 +421,17 @@ fn save(reader: &mut Reader, cursor: &mut Cursor, print: bool) -> Option<CardKin
         items.push(item(reader, cursor, from, to)?);
     }
     Some(CardKind::Save { of, items: if all { vec![] } else { items } })
+}
+
+/// The items up to the end of the card.
+pub fn items(reader: &mut Reader, cursor: &mut Cursor) -> Option<Vec<(String, Expr)>> {
+    let mut items = vec![];
+    while !cursor.is_done() {
+        let from = cursor.at;
+        cursor.at = end_of_item(cursor);
+        items.push(item(reader, cursor, from, cursor.at)?);
+    }
+    Some(items)
 }
 
 /// Items end at blanks outside brackets and braces.
