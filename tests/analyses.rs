@@ -3,27 +3,14 @@
 //! Tolerances: 1e-9 of the value against closed forms, equal bits for steps against separate runs, 1e-6 of the value
 //! against what ngspice 39 prints with seven figures.
 
+mod small_signal;
+
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::pipeline::{prepare, run_text};
 use bondspice::source::SourceMap;
 use bondspice::trace::Trace;
+use small_signal::{column, errors, has_ngspice, ngspice, run};
 use std::f64::consts::TAU;
-
-fn run(deck: &str) -> Trace {
-    match run_text("deck.cir", &format!("title\n{deck}\n.end\n"), &Overrides::default()) {
-        Ok((trace, _)) => trace,
-        Err(d) => panic!("{deck}\n{d:#?}"),
-    }
-}
-
-fn errors(deck: &str) -> Vec<&'static str> {
-    let found = run_text("deck.cir", &format!("title\n{deck}\n.end\n"), &Overrides::default());
-    found.expect_err(deck).iter().map(|d| d.code).filter(|code| code.starts_with('E')).collect()
-}
-
-fn column<'t>(trace: &'t Trace, name: &str) -> &'t [f64] {
-    trace.column(name).unwrap_or_else(|| panic!("no {name} in {:?}", trace.names))
-}
 
 /// The largest |ours − exact| by |exact| of a phasor column.
 fn misfit(trace: &Trace, name: &str, exact: impl Fn(f64) -> (f64, f64)) -> f64 {
@@ -54,6 +41,81 @@ fn a_resonant_circuit_in_ac() {
         let (x, y) = bottom(*f);
         assert!((db + 20.0 * x.hypot(y).log10()).abs() < 1e-9, "{f}");
     }
+}
+
+#[test]
+fn ladders_in_ac() {
+    // n equal sections RC, open at the end: 1/v(n) = B_n(x) = Σ C(n + k, n − k)·x^k, x = jωRC (Morgan-Voyce polynomials).
+    for n in [1u64, 3, 8] {
+        let mut deck = String::from("v1 n0 0 ac 1\n");
+        for k in 1..=n {
+            deck += &format!("r{k} n{} n{k} 1k\nc{k} n{k} 0 1u\n", k - 1);
+        }
+        let trace = run(&format!("{deck}.ac dec 5 0.1 100k\n.print ac v(n{n})"));
+        let choose = |n: u64, k: u64| (1..=k).fold(1.0, |c, j| c * (n - k + j) as f64 / j as f64);
+        let exact = |f: f64| {
+            let (mut sum, mut power) = ((0.0, 0.0), (1.0, 0.0));
+            for k in 0..=n {
+                let c = choose(n + k, n - k);
+                sum = (sum.0 + c * power.0, sum.1 + c * power.1);
+                power = (-power.1 * TAU * f * 1e-3, power.0 * TAU * f * 1e-3);
+            }
+            divide((1.0, 0.0), sum)
+        };
+        let off = misfit(&trace, &format!("v(n{n})"), exact);
+        assert!(off < 1e-9, "{n} sections: {off:e}");
+    }
+}
+
+/// A deck in a dialect.
+fn run_as(dialect: &str, deck: &str) -> Trace {
+    let overrides = Overrides { dialect: Some(dialect.into()), ..Overrides::default() };
+    match run_text("deck.cir", &format!("title\n{deck}\n.end\n"), &overrides) {
+        Ok((trace, _)) => trace,
+        Err(d) => panic!("{deck}\n{d:#?}"),
+    }
+}
+
+#[test]
+fn phases_are_in_the_unit_of_the_dialect() {
+    let deck = "v1 a 0 ac 1\nr1 a b 1k\nc1 b 0 1u\n.ac list 100\n.print ac vp(b) ip(c1) vdb(b)";
+    let exact = -(TAU * 0.1).atan();
+    for (dialect, unit, factor) in [
+        ("ngspice", "rad", 1.0),
+        ("xyce", "rad", 1.0),
+        ("spice", "rad", 1.0),
+        ("ltspice", "deg", 360.0 / TAU),
+    ] {
+        let trace = run_as(dialect, deck);
+        assert!((column(&trace, "vp(b)")[0] - exact * factor).abs() < 1e-9, "{dialect}");
+        let current = (TAU / 4.0 + exact) * factor;
+        assert!((column(&trace, "ip(c1)")[0] - current).abs() < 1e-9, "{dialect}");
+        assert_eq!(trace.units[1], unit, "{dialect}");
+    }
+}
+
+#[test]
+fn parts_of_phasors_within_expressions() {
+    let trace = run(
+        "v1 a 0 ac 2\nr1 a b 1k\nc1 b 0 1u\n.param k=3\n.ac list 100 1k\n.print ac {k*vm(b)} {vr(b)*vr(b)+vi(b)*vi(b)} {db(v(b))-vdb(a,b)} par('im(c1)*1k') {vm(a)/vm(b)} {v(b)/v(a)}",
+    );
+    for (k, f) in [100.0f64, 1e3].iter().enumerate() {
+        let x = TAU * f * 1e-3;
+        let size = 2.0 / (1.0 + x * x).sqrt();
+        let close = |name: &str, exact: f64| {
+            let ours = column(&trace, name)[k];
+            assert!((ours - exact).abs() < 1e-9 * exact.abs(), "{name}: {ours} for {exact}");
+        };
+        close("{k*vm(b)}", 3.0 * size);
+        close("{vr(b)*vr(b)+vi(b)*vi(b)}", size * size);
+        close("{db(v(b))-vdb(a,b)}", -20.0 * x.log10());
+        close("im(c1)*1k", x * size);
+        close("{vm(a)/vm(b)}", (1.0 + x * x).sqrt());
+        close("{v(b)/v(a)}.re", 1.0 / (1.0 + x * x));
+    }
+    // A function of the deck's own keeps its meaning where outputs do not stand.
+    let trace = run(".func vm(x) {7*x}\nv1 a 0 {vm(2)}\nr1 a 0 1\n.op\n.print op v(a)");
+    assert_eq!(column(&trace, "v(a)"), [14.0]);
 }
 
 #[test]
@@ -111,11 +173,11 @@ fn transfer_functions_of_dividers_and_amplifiers() {
     }
 }
 
+const DIODE: &str = "v1 a 0 0\nr1 a b 100\nd1 b 0 dm\n.model dm d(is=1e-14 n=1.5)";
+
 #[test]
-fn a_diode_over_its_voltage_as_ngspice_has_it() {
-    let trace = run(
-        "v1 a 0 0\nr1 a b 100\nd1 b 0 dm\n.model dm d(is=1e-14 n=1.5)\n.dc v1 -1 1 0.5\n.print dc v(b) i(v1)",
-    );
+fn a_diode_over_its_voltage_obeys_kirchhoff() {
+    let trace = run(&format!("{DIODE}\n.dc v1 -1 1 0.5\n.print dc v(b) i(v1)"));
     assert_eq!(trace.names, ["v1", "v(b)", "i(v1)"]);
     assert_eq!(column(&trace, "v1"), [-1.0, -0.5, 0.0, 0.5, 1.0]);
     for (v1, (vb, i)) in
@@ -129,6 +191,78 @@ fn a_diode_over_its_voltage_as_ngspice_has_it() {
             assert!((exact + i).abs() < 1e-4 * i.abs(), "{v1} {i} {exact}");
         }
     }
+}
+
+/// The rows of a table that ngspice prints, without their numbers.
+fn table(said: &str, columns: usize) -> Vec<Vec<f64>> {
+    let row = |line: &str| -> Option<Vec<f64>> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        words.first()?.parse::<u32>().ok()?;
+        words[1..].iter().map(|word| word.parse().ok()).collect()
+    };
+    said.lines().filter_map(row).filter(|row| row.len() == columns).collect()
+}
+
+#[test]
+fn sweeps_of_voltage_and_temperature_as_ngspice_has_them() {
+    if !has_ngspice() {
+        return;
+    }
+    // The temperature reaches resistors with coefficients and diodes. ngspice's constants differ in the seventh figure.
+    let warm = format!("{DIODE}\nr2 c 0 1k tc=2m,5u\ni2 0 c 1m");
+    for (deck, card, items) in [
+        (DIODE, ".dc v1 -1 1 0.25", "v(b) i(v1)"),
+        (&*warm, ".dc temp -20 100 30", "v(c) v(b) i(v1)"),
+    ] {
+        let deck = deck.replace("v1 a 0 0", "v1 a 0 1");
+        let text =
+            format!("{deck}\n{card}\n.options reltol=1e-8 abstol=1e-18 vntol=1e-12 gmin=1e-15");
+        let trace = run(&format!("{text}\n.print dc {items}"));
+        let said = ngspice(&text, &format!("run\nprint {items}"));
+        let theirs = table(&said, trace.names.len());
+        assert_eq!(theirs.len(), trace.rows(), "{said}");
+        for (k, row) in theirs.iter().enumerate() {
+            for (ours, theirs) in trace.columns.iter().map(|column| column[k]).zip(row) {
+                let off = (ours - theirs).abs();
+                assert!(off <= 1e-5 * theirs.abs() + 1e-12, "{card} row {k}: {ours} {theirs}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_temperature_reaches_devices_in_sweeps_and_steps() {
+    let deck = "i1 0 a 1m\nr1 a 0 1k tc=1m,2u\nd1 b 0 dm\ni2 0 b 1m\n.model dm d(is=1e-14)";
+    let swept = run(&format!("{deck}\n.dc temp -23 77 50\n.print dc v(a) v(b)"));
+    let stepped = run(&format!("{deck}\n.op\n.step temp -23 77 50\n.print op v(a) v(b)"));
+    for (k, t) in [-23.0f64, 27.0, 77.0].iter().enumerate() {
+        let d = t - 27.0;
+        let exact = 1.0 + 1e-3 * d + 2e-6 * d * d;
+        assert!((column(&swept, "v(a)")[k] - exact).abs() < 1e-9, "{t}");
+        assert!((column(&stepped, "v(a)")[k] - exact).abs() < 1e-9, "{t}");
+        let diodes = [&swept, &stepped].map(|trace| column(trace, "v(b)")[k]);
+        // About -2 mV/K.
+        let slope = (diodes[0] - column(&swept, "v(b)")[1]) / d;
+        assert!(d == 0.0 || (-2.5e-3..-1.0e-3).contains(&slope), "{t} {slope}");
+        assert!((diodes[0] - diodes[1]).abs() < 1e-9, "{diodes:?}");
+    }
+}
+
+#[test]
+fn an_error_in_a_sweep_says_where_it_was() {
+    let said = |deck: &str| {
+        let text = format!("title\n{deck}\n.end\n");
+        let found = run_text("deck.cir", &text, &Overrides::default()).expect_err(deck);
+        found.iter().map(|d| format!("{} {:?}", d.message, d.notes)).collect::<String>()
+    };
+    // Values for which a device makes no sense, in a sweep and in a step; one for which there is no operating point.
+    let deck = "v1 a 0 1\nr1 a b 1k\nc1 b 0 1u\nt1 b 0 c 0 z0={z} td=1n\nr2 c 0 50\n.param z=50";
+    let dc = said(&format!("{deck}\n.dc z list 50 75 -1"));
+    assert!(dc.contains("at z = -1e0"), "{dc}");
+    let step = said(&format!("{deck}\n.op\n.step param z list 50 75 -1"));
+    assert!(step.contains("in step 2: z = -1e0"), "{step}");
+    let table = said(&format!("{deck}\n.data t z v1\n+ 50 1\n+ -1 2\n.enddata\n.dc data=t"));
+    assert!(table.contains("at z = -1e0, v1 = 2e0"), "{table}");
 }
 
 #[test]

@@ -80,6 +80,17 @@ pub trait Language {
         pair: Pair<'_, Self::Rule>,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Expr<Self::Leaf>>;
+    /// The tree of a call that the language reads in its own way, whatever the table of functions says; `None` leaves it
+    /// to the table. On an error, pushes it and gives `Some(None)`.
+    #[allow(clippy::option_option)]
+    fn own_call(
+        &mut self,
+        _name: &str,
+        _pair: &Pair<'_, Self::Rule>,
+        _d: &mut Vec<Diagnostic>,
+    ) -> Option<Option<Expr<Self::Leaf>>> {
+        None
+    }
     /// The tree of a call that the table of functions does not know. On an error, pushes it and gives `None`.
     fn call(
         &mut self,
@@ -306,6 +317,9 @@ fn call<L: Language>(
     let span = language.span(pair.as_span());
     let mut inner = pair.clone().into_inner();
     let name = inner.next()?.as_str().trim_end();
+    if let Some(own) = language.own_call(name, &pair, d) {
+        return own.map(measured);
+    }
     let Some(meaning) = names::find(language.dialect(), name) else {
         return language.call(name, pair.clone(), d).map(measured);
     };

@@ -65,6 +65,10 @@ pub struct Reading {
     pub arrives: bool,
     /// Whether a parameter of an X card wins over a `.param` of its name within the subcircuit.
     pub instance_wins: bool,
+    /// Whether phases are in degrees.
+    pub degrees: bool,
+    /// Whether `vm(a)` and its like within an expression are parts of phasors: in outputs, where no `.func` can be meant.
+    pub parts: bool,
 }
 
 /// What numbers may end with.
@@ -131,6 +135,8 @@ pub const NGSPICE: Dialect = Dialect {
         initial_holds: false,
         arrives: false,
         instance_wins: false,
+        degrees: false,
+        parts: false,
     }),
 };
 
@@ -175,6 +181,8 @@ pub const DIALECTS: &[Dialect] = &[
             initial_holds: true,
             arrives: true,
             instance_wins: true,
+            degrees: false,
+            parts: false,
         }),
         ..NGSPICE
     },
@@ -206,6 +214,7 @@ pub const DIALECTS: &[Dialect] = &[
         read: Some(Reading {
             numbers: Numbers { atto: false, x_is_mega: false, digits_behind: true },
             comments: &[";"],
+            degrees: true,
             ..READING
         }),
         ..NGSPICE

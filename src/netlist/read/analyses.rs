@@ -12,7 +12,8 @@ use super::{Cursor, Reader};
 use crate::circuit::{Drive, Roots};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::analysis::{Analysis, Data, Points, Print, Sweep};
-use crate::netlist::{CardKind, Expr, Leaf, Name, Part};
+use crate::netlist::dialects::Reading;
+use crate::netlist::{CardKind, Expr, Leaf, Name, Names, Part};
 
 /// `.dc`.
 pub fn dc(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
@@ -306,12 +307,13 @@ pub fn part(name: &str) -> Option<(char, &str)> {
     (matches!(kind, 'v' | 'i') && known).then_some((kind, rest))
 }
 
-/// The part of a phasor that letters or a function mean. A phase is in radians, as ngspice prints it.
-pub fn phasor_part(text: &str) -> Option<Part> {
+/// The part of a phasor that letters or a function mean.
+fn phasor_part(text: &str, degrees: bool) -> Option<Part> {
     Some(match text.to_ascii_lowercase().as_str() {
         "r" | "re" | "real" => Part::Real,
         "i" | "im" | "img" | "imag" => Part::Imaginary,
         "m" | "mag" => Part::Magnitude,
+        "p" | "ph" | "phase" if degrees => Part::Degrees,
         "p" | "ph" | "phase" => Part::Phase,
         "db" => Part::Decibel,
         _ => return None,
@@ -320,42 +322,43 @@ pub fn phasor_part(text: &str) -> Option<Part> {
 
 /// What outputs read beside v() and i(): parts of phasors (`vdb(out)`, `im(v1)`, `db(v(out))`), powers (`p(r1)`), and
 /// Xyce's `n(node)`.
-pub fn reading(reader: &mut Reader, text: &str) -> Option<Leaf> {
+pub fn reading(names: &mut Names, how: &Reading, text: &str) -> Option<Leaf> {
     let (name, rest) = text.split_once('(')?;
     let inner = rest.strip_suffix(')')?;
     let plain =
         |text: &str| !text.is_empty() && !text.contains(['(', ')', '{', '*', '/', ' ', '\'']);
     let words: Vec<&str> = inner.split(',').map(str::trim).collect();
-    let voltage = |reader: &mut Reader, words: &[&str]| match words {
-        [a] if plain(a) => Some(Leaf::Voltage(reader.node_name(a), None)),
+    let node = |names: &mut Names, word: &str| super::cursor::node_name(names, how.grounds, word);
+    let voltage = |names: &mut Names, words: &[&str]| match words {
+        [a] if plain(a) => Some(Leaf::Voltage(node(names, a), None)),
         [a, b] if plain(a) && plain(b) => {
-            let minus = reader.node_name(b);
-            Some(Leaf::Voltage(reader.node_name(a), Some(minus)))
+            let minus = node(names, b);
+            Some(Leaf::Voltage(node(names, a), Some(minus)))
         }
         _ => None,
     };
     if let Some((kind, part)) = part(name) {
         let leaf = match (kind, &words[..]) {
-            ('v', words) => voltage(reader, words)?,
-            (_, [device]) if plain(device) => Leaf::Current(reader.names.intern(device)),
+            ('v', words) => voltage(names, words)?,
+            (_, [device]) if plain(device) => Leaf::Current(names.intern(device)),
             _ => return None,
         };
-        return Some(Leaf::Part(phasor_part(part)?, Box::new(leaf)));
+        return Some(Leaf::Part(phasor_part(part, how.degrees)?, Box::new(leaf)));
     }
     match (name.to_ascii_lowercase().as_str(), &words[..]) {
-        ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(reader.names.intern(device))),
+        ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(names.intern(device))),
         // An inner variable of a device, else a node.
         ("n", [own]) if own.to_ascii_lowercase().ends_with(":cd") && plain(own) => {
-            Some(Leaf::Parameter(reader.names.intern(own)))
+            Some(Leaf::Parameter(names.intern(own)))
         }
-        ("n", [_]) => voltage(reader, &words),
+        ("n", [_]) => voltage(names, &words),
         _ => {
-            let part = phasor_part(name).filter(|_| name.len() > 1)?;
+            let part = phasor_part(name, how.degrees).filter(|_| name.len() > 1)?;
             let (of, rest) = inner.split_once('(')?;
             let words: Vec<&str> = rest.strip_suffix(')')?.split(',').map(str::trim).collect();
             let leaf = match (of.trim().to_ascii_lowercase().as_str(), &words[..]) {
-                ("v", words) => voltage(reader, words)?,
-                ("i", [device]) if plain(device) => Leaf::Current(reader.names.intern(device)),
+                ("v", words) => voltage(names, words)?,
+                ("i", [device]) if plain(device) => Leaf::Current(names.intern(device)),
                 _ => return None,
             };
             Some(Leaf::Part(part, Box::new(leaf)))

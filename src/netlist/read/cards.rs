@@ -472,7 +472,7 @@ pub fn item(
         let leaf = Leaf::Parameter(reader.names.intern(text));
         return Some((text.to_string(), Expr::new(Node::Leaf(leaf), span)));
     }
-    if let Some(leaf) = analyses::reading(reader, text) {
+    if let Some(leaf) = analyses::reading(&mut reader.names, &reader.reading, text) {
         let name = text.split_whitespace().collect::<String>();
         return Some((name, Expr::new(Node::Leaf(leaf), span)));
     }
@@ -482,7 +482,7 @@ pub fn item(
         Some(_) if text.ends_with("')") => (from + 5, to - 2),
         _ => (from, to),
     };
-    let expr = reader.grouped(cursor, from, to)?;
+    let expr = reader.output(cursor, from, to)?;
     let name = cursor.text[from..to].split_whitespace().collect::<String>();
     Some((name, expr))
 }

@@ -252,6 +252,14 @@ impl Reader<'_> {
         self.expression(cursor, from, to)
     }
 
+    /// The same as an output, which may speak of parts of phasors.
+    pub fn output(&mut self, cursor: &Cursor, from: usize, to: usize) -> Option<Expr> {
+        let parts = std::mem::replace(&mut self.reading.parts, true);
+        let expr = self.grouped(cursor, from, to);
+        self.reading.parts = parts;
+        expr
+    }
+
     /// The expression between two places.
     pub fn expression(&mut self, cursor: &Cursor, from: usize, to: usize) -> Option<Expr> {
         let text = &cursor.text[from..to];

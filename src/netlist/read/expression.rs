@@ -1,10 +1,10 @@
 //! Expressions of netlists, by the shared grammar with SPICE's leaves.
 
-use super::calls;
 use super::cursor::node_name;
 use super::functions::Calls;
 use super::linked;
 use super::number;
+use super::{analyses, calls};
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{self, Node, Table};
@@ -294,6 +294,36 @@ impl Language for Spice<'_> {
             }
         };
         Some(Expr::new(node, span))
+    }
+
+    /// In outputs, parts of phasors: `vm(a)`, `re(v(a))`.
+    fn own_call(
+        &mut self,
+        name: &str,
+        pair: &Pair<'_, Rule>,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Option<Expr>> {
+        if !self.reading.parts {
+            return None;
+        }
+        let span = self.span(pair.as_span());
+        let text = pair.as_str().replace(COLON, ":");
+        if let Some(leaf @ Leaf::Part(..)) = analyses::reading(self.names, &self.reading, &text) {
+            return Some(Some(Expr::new(Node::Leaf(leaf), span)));
+        }
+        // What the table of functions makes of these is right of real numbers alone.
+        let parts = ["re", "im", "img", "r"];
+        let lower = text.to_ascii_lowercase();
+        if parts.iter().any(|part| part.eq_ignore_ascii_case(name))
+            && (lower.contains("v(") || lower.contains("i("))
+        {
+            let message =
+                format!("`{name}` is taken of a voltage or a current, not of an expression");
+            let error = Diagnostic::error("E0773", span, message);
+            d.push(error.help("`re(v(a))`, `im(v(a,b))`, `re(i(r1))`, `vr(a)`, `vi(a)`"));
+            return Some(None);
+        }
+        None
     }
 
     /// `table(x, x0, y0, …)` and `pwl(x, x0, y0, …)`.

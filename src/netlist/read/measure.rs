@@ -169,15 +169,15 @@ fn item(reader: &mut Reader, cursor: &mut Cursor) -> Option<Expr> {
     let text = &cursor.text[from..to];
     let inner = text.get(..4).filter(|begin| begin.eq_ignore_ascii_case("par("));
     match inner.and_then(|_| text.strip_suffix(')')) {
-        Some(_) => reader.grouped(cursor, from + 4, to - 1),
+        Some(_) => reader.output(cursor, from + 4, to - 1),
         // `v1#branch` and `@r1[i]`, as `.print` takes them.
         None if text.contains('#') || text.starts_with('@') => {
             super::cards::item(reader, cursor, from, to).map(|(_, expr)| expr)
         }
         // `vdb(out)`, `p(r1)`.
-        None => match super::analyses::reading(reader, text) {
+        None => match super::analyses::reading(&mut reader.names, &reader.reading, text) {
             Some(leaf) => Some(Expr::new(Node::Leaf(leaf), cursor.span(reader, from, to))),
-            None => reader.grouped(cursor, from, to),
+            None => reader.output(cursor, from, to),
         },
     }
 }
