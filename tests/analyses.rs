@@ -209,7 +209,7 @@ fn sweeps_of_voltage_and_temperature_as_ngspice_has_them() {
         return;
     }
     // The temperature reaches resistors with coefficients and diodes. ngspice's constants differ in the seventh figure.
-    let warm = format!("{DIODE}\nr2 c 0 1k tc=2m,5u\ni2 0 c 1m");
+    let warm = format!("{DIODE}\nr2 c 0 1k tc1=2m tc2=5u\ni2 0 c 1m");
     for (deck, card, items) in [
         (DIODE, ".dc v1 -1 1 0.25", "v(b) i(v1)"),
         (&*warm, ".dc temp -20 100 30", "v(c) v(b) i(v1)"),

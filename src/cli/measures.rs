@@ -149,7 +149,8 @@ impl<'a> Measuring<'a> {
 
 impl Sink for Measuring<'_> {
     fn row(&mut self, values: &[f64]) -> io::Result<()> {
-        if !self.times && !(self.list.is_empty() && self.harmonics.is_empty()) {
+        let any = !self.list.is_empty() || !self.harmonics.is_empty();
+        if !self.times && any {
             self.measure(values);
         }
         self.to.row(&values[..self.shown.min(values.len())])

@@ -40,7 +40,9 @@ pub fn has_ngspice() -> bool {
 pub fn ngspice(deck: &str, commands: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deck.cir");
-    let text = format!("title\n{deck}\n.control\nset numdgt=15\nset width=250\n{commands}\necho\n.endc\n.end\n");
+    let text = format!(
+        "title\n{deck}\n.control\nset numdgt=15\nset width=250\n{commands}\necho\n.endc\n.end\n"
+    );
     std::fs::write(&path, text).unwrap();
     let output = Command::new("ngspice").arg("-b").arg(&path).output().unwrap();
     String::from_utf8_lossy(&output.stdout).to_string()

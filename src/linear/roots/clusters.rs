@@ -139,13 +139,13 @@ fn uncertainty(pencil: &mut Pencil, z: Complex) -> Option<(f64, f64)> {
     };
     let (x, y) = (vector(false), vector(true));
     let (mut fixed, mut storage, mut product) = (0.0, 0.0, Complex::ZERO);
-    for column in 0..n {
+    for (column, right) in x.iter().enumerate() {
         for slot in pencil.pattern.column(column) {
             let row = pencil.pattern.rows[slot] as usize;
-            let weight = size(y[row]) * size(x[column]);
+            let weight = size(y[row]) * size(*right);
             fixed += weight * pencil.fixed[slot].abs();
             storage += weight * pencil.storage[slot].abs();
-            product = product + (y[row] * x[column]).scaled(pencil.storage[slot]);
+            product = product + (y[row] * *right).scaled(pencil.storage[slot]);
         }
     }
     let bottom = size(product);
