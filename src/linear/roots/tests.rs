@@ -2,8 +2,10 @@
 
 use super::*;
 
+type Triplets = Vec<(u32, u32, f64)>;
+
 /// Companion pencil of a polynomial a₀ + a₁·s + …: its roots are the polynomial's.
-fn companion(coefficients: &[f64]) -> (usize, Vec<(u32, u32, f64)>, Vec<(u32, u32, f64)>) {
+fn companion(coefficients: &[f64]) -> (usize, Triplets, Triplets) {
     let n = coefficients.len() as u32 - 1;
     let mut fixed: Vec<(u32, u32, f64)> = (1..n).map(|k| (k - 1, k, -1.0)).collect();
     fixed.extend((0..n).map(|k| (n - 1, k, coefficients[k as usize])));
