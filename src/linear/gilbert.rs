@@ -6,6 +6,8 @@ use super::{Field, Pattern, Singular};
 
 /// A preferred pivot is taken when it is at least this large relative to the largest of its column.
 const THRESHOLD: f64 = 1e-2;
+/// Where the preferred row is not to be had, the sparsest of those is taken that are this large.
+const SPARSEST: f64 = 0.1;
 const NONE: u32 = u32::MAX;
 
 struct Work<T> {
@@ -20,6 +22,8 @@ struct Work<T> {
     order_of: Vec<u32>,
     /// Bounds of noise of the multipliers, beside `lower`.
     lower_size: Vec<f64>,
+    /// How many entries each row of the matrix has.
+    counts: Vec<u32>,
 }
 
 /// Chooses pivots for (scaled) values, taking columns in `order`, of each column the row `preferred[column]` if it can.
@@ -39,7 +43,9 @@ pub fn eliminate<T: Field>(
         stack: Vec::new(),
         order_of: vec![NONE; n],
         lower_size: Vec::new(),
+        counts: vec![0; n],
     };
+    pattern.rows.iter().for_each(|row| work.counts[*row as usize] += 1);
     let mut noise = if T::EXACT { 0.0 } else { NOISE };
     let mut waiting: Vec<u32> = order.to_vec();
     // Columns without a usable pivot wait until the others are done.
@@ -160,10 +166,16 @@ impl<T: Field> Work<T> {
             }
         }
         let (largest, row) = best?;
-        match wanted {
-            Some(size) if size >= THRESHOLD * largest => Some(preferred),
-            _ => Some(row),
+        if wanted.is_some_and(|size| size >= THRESHOLD * largest) {
+            return Some(preferred);
         }
+        let usable = |row: &&u32| {
+            let size = self.value[**row as usize].magnitude();
+            self.order_of[**row as usize] == NONE && size >= SPARSEST * largest
+        };
+        let sparsest =
+            self.rows.iter().filter(usable).min_by_key(|row| self.counts[**row as usize]);
+        Some(sparsest.copied().unwrap_or(row))
     }
 
     fn store(&mut self, result: &mut Elimination<T>, column: u32, pivot_row: u32) {
