@@ -54,7 +54,7 @@ fn value(circuit: &Circuit, law: &Expr, draw: f64) -> f64 {
         Leaf::Voltage(a, b) => node(a.0) - node(b.0),
         Leaf::Current(device) => named(&circuit.devices[device.0 as usize].name),
         Leaf::Time => draw,
-        Leaf::Part(..) => panic!("no part of a phasor stands in a law"),
+        Leaf::Part(..) | Leaf::Capacitance(_) => panic!("only outputs speak of these"),
     })
 }
 

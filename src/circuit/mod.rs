@@ -223,7 +223,7 @@ pub enum DeviceKind {
     },
     /// Junction diode.
     Diode {
-        model: DiodeModel,
+        model: Box<DiodeModel>,
         instance: DiodeInstance,
     },
 }

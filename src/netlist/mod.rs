@@ -119,7 +119,7 @@ pub enum CardKind {
     /// `.op`.
     OperatingPoint,
     /// `.measure`.
-    Measure(Measure),
+    Measure(Box<Measure>),
     /// `.four`: harmonics of the last period.
     Fourier(Fourier),
     /// `.dc`, `.ac`, `.tf` and the others.

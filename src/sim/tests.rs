@@ -409,7 +409,7 @@ fn the_operating_point_of_a_diode() {
     };
     let exponential = call(Function::Exp, times(volt(2, 0), Expr::number(1.0 / thermal)));
     let law = times(Expr::number(1e-12), plus(exponential, Expr::number(-1.0)));
-    let diode = DeviceKind::Diode { model, instance: DiodeInstance::default() };
+    let diode = DeviceKind::Diode { model: Box::new(model), instance: DiodeInstance::default() };
     for (name, device) in [("D1", diode), ("B1", DeviceKind::BehaviouralCurrent { law })] {
         let system = system(vec![
             ("V1", vec![1, 0], dc(1.0)),

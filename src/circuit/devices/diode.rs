@@ -272,7 +272,7 @@ mod tests {
 
     fn diode(model: DiodeModel, area: f64) -> crate::circuit::stamps::Stamps {
         let instance = DiodeInstance { area, ..DiodeInstance::default() };
-        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model, instance })])
+        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model: Box::new(model), instance })])
     }
 
     fn at(law: &Law, v: f64) -> f64 {
@@ -353,6 +353,7 @@ mod tests {
             DiodeModel { grading: 1.0, ..MODEL },
         ] {
             let instance = DiodeInstance::default();
+            let model = Box::new(model);
             let circuit = circuit(vec![("d1", vec![1, 0], DeviceKind::Diode { model, instance })]);
             let mut diagnostics = vec![];
             assert!(crate::circuit::stamps::stamp(&circuit, &mut diagnostics).is_none());

@@ -379,7 +379,7 @@ fn diode(
         multiplicity: own.get("m"),
         temperature: own.given("temp").unwrap_or(lookup.flat.temperature + own.get("dtemp")),
     };
-    Some(DeviceKind::Diode { model, instance })
+    Some(DeviceKind::Diode { model: Box::new(model), instance })
 }
 
 /// Whether any device stands at ground.

@@ -129,7 +129,7 @@ pub fn measure(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
         }
     };
     let text = cursor.text[begin..].split_whitespace().collect::<Vec<_>>().join(" ");
-    Some(CardKind::Measure(Measure { name, analysis, kind, text }))
+    Some(CardKind::Measure(Box::new(Measure { name, analysis, kind, text })))
 }
 
 /// Where an expression ends: at a blank, comma or `=` outside brackets and quotes.
