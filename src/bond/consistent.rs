@@ -46,7 +46,15 @@ pub enum Trouble {
 
 /// Newton's method stops when each row holds to this part of its terms.
 const BACKWARD: f64 = 1e-13;
+/// Where it gets no better it may be this one.
+const COARSE: f64 = 1e-11;
+/// Or, where the terms of a row are 0 but for rounding, when whole steps with a Jacobian that does not change any more
+/// leave as much as they took away, so often in a row.
+const REFINEMENTS: usize = 2;
+const SAME: f64 = 1e-12;
+const LEFT: f64 = 4.0;
 const ITERATIONS: usize = 200;
+const HALVINGS: usize = 40;
 
 /// Solves the system from the guess in `y`.
 pub fn newton(
@@ -65,6 +73,7 @@ pub fn newton(
     let (mut work, mut trial) = (vec![0.0; n], vec![0.0; n]);
     let mut best = f64::INFINITY;
     let mut worst_row = 0;
+    let (mut before, mut taken, mut refined) = (vec![], vec![], 0);
     for _ in 0..ITERATIONS {
         compiled.jacobian(t, inside, y, &mut f, &mut jacobian);
         assemble(compiled, slots, &places, &jacobian, &mut values);
@@ -72,9 +81,21 @@ pub fn newton(
         combine(slots, &f, y, &mut residual);
         let (error, row) = backward_error(&pattern, &values, slots, &residual, y);
         worst_row = row;
-        if error <= BACKWARD || (error <= 1e-11 && error >= 0.5 * best) {
+        if error <= BACKWARD || (error <= COARSE && error >= 0.5 * best) {
             return Ok(());
         }
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs();
+        let same = !before.is_empty() && before.iter().zip(&values).all(near);
+        refined = if same && !taken.is_empty() { refined + 1 } else { 0 };
+        if refined >= REFINEMENTS {
+            let terms = row_terms(&pattern, &values, slots, |i| y[i]);
+            let left = spread(&pattern, &values, vec![0.0; n], |i| taken[i]);
+            let rounding = |i: usize| COARSE * terms[i] + LEFT * left[i];
+            if (0..n).all(|i| residual[i].abs() <= rounding(i)) {
+                return Ok(());
+            }
+        }
+        before.clone_from(&values);
         best = best.min(error);
         if lu.as_mut().is_none_or(|lu| lu.refactor(&values).is_err()) {
             lu = Some(Lu::factor(&pattern, &values).map_err(Trouble::Singular)?);
@@ -91,19 +112,28 @@ pub fn newton(
         };
         let start = merit(&residual);
         let mut length = 1.0;
-        for _ in 0..40 {
+        let mut better = false;
+        for _ in 0..HALVINGS {
             for i in 0..n {
                 trial[i] = y[i] + length * step[i];
             }
             compiled.residual(t, inside, &trial, &mut f);
             combine(slots, &f, &trial, &mut residual);
             let now = merit(&residual);
-            if now.is_finite() && (now <= start * (1.0 - 0.25 * length) || now < 1e-26) {
+            better = now.is_finite() && (now <= start * (1.0 - 0.25 * length) || now < 1e-26);
+            if better {
                 break;
             }
             length *= 0.5;
         }
-        y.copy_from_slice(&trial);
+        if !better && same {
+            // Rounding is all that there is to be improved.
+            length = 1.0;
+            y.iter_mut().zip(&step).for_each(|(y, step)| *y += step);
+        } else {
+            y.copy_from_slice(&trial);
+        }
+        taken = if length == 1.0 { step } else { vec![] };
     }
     Err(Trouble::Diverged { row: worst_row })
 }
@@ -348,15 +378,24 @@ fn combine(slots: &[Slot], f: &[f64], y: &[f64], residual: &mut [f64]) {
     }
 }
 
-/// Σ |entry·y| of each row.
+/// Σ |entry·y| of each row, and what is fixed in it.
 fn row_terms(
     pattern: &Pattern,
     values: &[f64],
     slots: &[Slot],
     y: impl Fn(usize) -> f64,
 ) -> Vec<f64> {
-    let mut sums: Vec<f64> =
-        slots.iter().map(|slot| slot.fixed.map_or(0.0, |(_, value)| value.abs())).collect();
+    let fixed = slots.iter().map(|slot| slot.fixed.map_or(0.0, |(_, value)| value.abs()));
+    spread(pattern, values, fixed.collect(), y)
+}
+
+/// Adds Σ |entry·y| to the sum of each row.
+fn spread(
+    pattern: &Pattern,
+    values: &[f64],
+    mut sums: Vec<f64>,
+    y: impl Fn(usize) -> f64,
+) -> Vec<f64> {
     for column in 0..pattern.n {
         for slot in pattern.column(column) {
             sums[pattern.rows[slot] as usize] += (values[slot] * y(column)).abs();

@@ -70,37 +70,44 @@ struct Entry {
 /// Below this part of what entered it an entry counts as cancelled.
 const CANCELLED: f64 = 1e-11;
 
-#[derive(Clone, Debug, Default)]
-struct Row {
-    entries: BTreeMap<usize, Entry>,
-    from: BTreeSet<usize>,
+type Row = BTreeMap<usize, Entry>;
+
+/// What a subtraction did to the places of a row's entries.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Became {
+    Entry,
+    Nothing,
 }
 
-impl Row {
-    /// self −= factor·other; the entry at `pivot` vanishes exactly.
-    fn subtract(&mut self, factor: f64, other: &Row, pivot: usize) {
-        for (&column, entry) in &other.entries {
-            let taken = factor * entry.value;
-            let mine = self.entries.get(&column).copied();
-            let (value, weight) = match mine {
-                Some(old) => (
-                    old.value - taken,
-                    old.weight.max(taken.abs()).max(factor.abs() * entry.weight),
-                ),
-                None => (-taken, taken.abs().max(factor.abs() * entry.weight)),
-            };
-            if column == pivot || value.abs() <= CANCELLED * weight {
-                self.entries.remove(&column);
-            } else {
-                self.entries.insert(column, Entry { value, weight });
+/// row −= factor·other; the entry at `pivot` vanishes exactly. Tells of each entry that appears or vanishes.
+fn subtract(
+    row: &mut Row,
+    factor: f64,
+    other: &Row,
+    pivot: usize,
+    tell: &mut dyn FnMut(usize, Became),
+) {
+    for (&column, entry) in other {
+        let taken = factor * entry.value;
+        let mine = row.get(&column).copied();
+        let (value, weight) = match mine {
+            Some(old) => {
+                (old.value - taken, old.weight.max(taken.abs()).max(factor.abs() * entry.weight))
             }
+            None => (-taken, taken.abs().max(factor.abs() * entry.weight)),
+        };
+        if column == pivot || value.abs() <= CANCELLED * weight {
+            if row.remove(&column).is_some() {
+                tell(column, Became::Nothing);
+            }
+        } else if row.insert(column, Entry { value, weight }).is_none() {
+            tell(column, Became::Entry);
         }
-        self.from.extend(other.from.iter().copied());
     }
+}
 
-    fn value(&self, column: usize) -> Option<f64> {
-        self.entries.get(&column).map(|entry| entry.value)
-    }
+fn value(row: &Row, column: usize) -> Option<f64> {
+    row.get(&column).map(|entry| entry.value)
 }
 
 /// Finds what the equations determine. `preference` lists the states from the one that most deserves to stay
@@ -108,8 +115,8 @@ impl Row {
 pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
     let (nx, n) = (equations.states, equations.unknowns);
     let column_scales = equilibrate(equations);
-    let row = |entries: &JacobianRow, from: Option<usize>| -> Row {
-        let mut result = Row::default();
+    let row = |entries: &JacobianRow| -> Row {
+        let mut result = Row::new();
         let scaled: Vec<(usize, f64)> = entries
             .iter()
             .map(|&(column, value)| (column, value * column_scales[column]))
@@ -118,56 +125,66 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
         if largest > 0.0 {
             for (column, value) in scaled.into_iter().filter(|(_, v)| *v != 0.0) {
                 let value = value / largest;
-                result.entries.insert(column, Entry { value, weight: value.abs() });
+                result.insert(column, Entry { value, weight: value.abs() });
             }
         }
-        result.from.extend(from);
         result
     };
-    let rows: Vec<Row> =
-        equations.algebraic.iter().enumerate().map(|(i, entries)| row(entries, Some(i))).collect();
+    let rows: Vec<Row> = equations.algebraic.iter().map(row).collect();
 
     // h over z.
-    let (mut pivots, left) = eliminate(rows, nx, n);
+    let Elimination { mut pivots, left, made_of } = eliminate(rows, nx, n);
+    let left = left.into_iter().map(|(i, row)| Left { row, from: origins(i, &made_of), origin: i });
 
     // What is left speaks of x alone.
     let mut structure =
         Structure { index_two: vec![false; n], loose: vec![false; n], ..Structure::default() };
-    let (constraints, idle) = dependents(left, preference);
+    let (constraints, idle) = dependents(left.collect(), preference);
     structure.idle = idle;
 
     // The constraints' derivatives over the columns of z that have no pivot yet.
-    let rates: Vec<Row> = equations.rates.iter().map(|entries| row(entries, None)).collect();
+    let rates: Vec<Row> = equations.rates.iter().map(row).collect();
     let scale_of_rate = |k: usize| {
         equations.rates[k].iter().fold(0.0f64, |m, &(c, v)| m.max((v * column_scales[c]).abs()))
     };
+    let mut place: Vec<Option<usize>> = vec![None; n];
+    for (at, (column, _)) in pivots.iter().enumerate() {
+        place[*column] = Some(at);
+    }
     let mut derivatives = vec![];
-    for (dependent, origin, constraint) in &constraints {
-        let mut derivative = Row::default();
-        for (&state, entry) in &constraint.entries {
+    for (dependent, Left { row: constraint, from, origin }) in &constraints {
+        let mut derivative = Row::new();
+        for (&state, entry) in constraint {
             // x in the constraint is scaled by its column, x' is not.
             let factor = entry.value / column_scales[state] * scale_of_rate(state);
-            derivative.subtract(-factor, &rates[state], usize::MAX);
+            subtract(&mut derivative, -factor, &rates[state], usize::MAX, &mut |_, _| {});
         }
-        derivative.entries.retain(|column, _| *column >= nx);
-        for (column, pivot) in &pivots {
-            if let Some(value) = derivative.value(*column)
-                && let Some(at) = pivot.value(*column)
-            {
-                derivative.subtract(value / at, pivot, *column);
-                derivative.entries.retain(|column, _| *column >= nx);
+        derivative.retain(|column, _| *column >= nx);
+        // A pivot row speaks of later pivots only.
+        let mut open: BTreeSet<usize> =
+            derivative.keys().filter_map(|column| place[*column]).collect();
+        while let Some(at) = open.pop_first() {
+            let (column, pivot) = &pivots[at];
+            if let (Some(own), Some(by)) = (value(&derivative, *column), value(pivot, *column)) {
+                let mut tell = |column: usize, became| {
+                    if became == Became::Entry {
+                        open.extend(place[column]);
+                    }
+                };
+                subtract(&mut derivative, own / by, pivot, *column, &mut tell);
+                derivative.retain(|column, _| *column >= nx);
             }
         }
         derivatives.push(derivative);
         structure.constraints.push(Constraint {
             dependent: *dependent,
-            on: constraint.entries.keys().copied().filter(|k| k != dependent).collect(),
+            on: constraint.keys().copied().filter(|k| k != dependent).collect(),
             row: *origin,
-            rows: constraint.from.iter().copied().collect(),
+            rows: from.iter().copied().collect(),
         });
     }
     let before = pivots.len();
-    let (hidden, higher) = eliminate(derivatives, nx, n);
+    let Elimination { pivots: hidden, left: higher, .. } = eliminate(derivatives, nx, n);
     structure.higher = higher.len();
     structure.hidden = hidden.iter().map(|(column, _)| *column).collect();
 
@@ -184,7 +201,7 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
     }
     pivots.extend(hidden);
     for (at, (column, pivot)) in pivots.iter().enumerate().rev() {
-        let others = || pivot.entries.keys().filter(|other| *other != column);
+        let others = || pivot.keys().filter(|other| *other != column);
         structure.loose[*column] |= others().any(|other| structure.loose[*other]);
         if at < before {
             structure.index_two[*column] |= others().any(|other| structure.index_two[*other]);
@@ -193,96 +210,132 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
     structure
 }
 
-/// Rows with a column or their first place.
-type Numbered = Vec<(usize, Row)>;
+/// What became of rows.
+struct Elimination {
+    /// Pivot rows in order, each with its column.
+    pivots: Vec<(usize, Row)>,
+    /// Rows without any of the columns left, each with its place.
+    left: Vec<(usize, Row)>,
+    /// By row: the pivot rows that were taken from it, by their places.
+    made_of: Vec<Vec<usize>>,
+}
 
-/// Eliminates over columns `nx..n`, the rows with the fewest entries there first. Returns pivot rows in order and the
-/// rows that have none of these columns left.
-fn eliminate(mut rows: Vec<Row>, nx: usize, n: usize) -> (Numbered, Numbered) {
+/// Eliminates over columns `nx..n`, the rows with the fewest entries there first.
+fn eliminate(mut rows: Vec<Row>, nx: usize, n: usize) -> Elimination {
     let mut holders: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); n];
-    let count = |row: &Row| row.entries.range(nx..).count();
+    let mut counts: Vec<usize> = rows.iter().map(|row| row.range(nx..).count()).collect();
     let mut queue = BTreeSet::new();
     for (i, row) in rows.iter().enumerate() {
-        for (&column, _) in row.entries.range(nx..) {
+        for (&column, _) in row.range(nx..) {
             holders[column].insert(i);
         }
-        queue.insert((count(row), i));
+        queue.insert((counts[i], i));
     }
     let (mut pivots, mut left) = (vec![], vec![]);
+    let mut made_of = vec![vec![]; rows.len()];
     while let Some((entries, i)) = queue.pop_first() {
         let row = std::mem::take(&mut rows[i]);
         if entries == 0 {
             left.push((i, row));
             continue;
         }
-        let largest = row.entries.range(nx..).fold(0.0f64, |m, (_, e)| m.max(e.value.abs()));
+        let largest = row.range(nx..).fold(0.0f64, |m, (_, e)| m.max(e.value.abs()));
+        // Of columns that as few rows hold, the largest entry: so a matrix with its weight on the diagonal is eliminated
+        // along it, stays symmetric and sparse, and no factor grows.
         let Some(pivot) = row
-            .entries
             .range(nx..)
-            .filter(|(_, entry)| entry.value.abs() >= 0.1 * largest)
-            .map(|(column, _)| *column)
-            .min_by_key(|column| holders[*column].len())
+            .map(|(column, entry)| (*column, entry.value.abs()))
+            .filter(|(_, size)| *size >= 0.1 * largest)
+            .min_by(|a, b| holders[a.0].len().cmp(&holders[b.0].len()).then(b.1.total_cmp(&a.1)))
+            .map(|(column, _)| column)
         else {
             continue;
         };
-        for (&column, _) in row.entries.range(nx..) {
+        for (&column, _) in row.range(nx..) {
             holders[column].remove(&i);
         }
-        let at = row.value(pivot).unwrap_or(1.0);
+        let at = value(&row, pivot).unwrap_or(1.0);
         for other in std::mem::take(&mut holders[pivot]) {
             let target = &mut rows[other];
-            let Some(value) = target.value(pivot) else { continue };
-            queue.remove(&(count(target), other));
-            let was: Vec<usize> = target.entries.range(nx..).map(|(c, _)| *c).collect();
-            target.subtract(value / at, &row, pivot);
-            for column in was {
-                if !target.entries.contains_key(&column) {
-                    holders[column].remove(&other);
+            let Some(own) = value(target, pivot) else { continue };
+            queue.remove(&(counts[other], other));
+            let count = &mut counts[other];
+            let mut tell = |column: usize, became| {
+                if column < nx {
+                    return;
                 }
-            }
-            for (&column, _) in target.entries.range(nx..) {
-                holders[column].insert(other);
-            }
-            queue.insert((count(target), other));
+                match became {
+                    Became::Entry => {
+                        holders[column].insert(other);
+                        *count += 1;
+                    }
+                    Became::Nothing => {
+                        holders[column].remove(&other);
+                        *count -= 1;
+                    }
+                }
+            };
+            subtract(target, own / at, &row, pivot, &mut tell);
+            made_of[other].push(i);
+            queue.insert((counts[other], other));
         }
         pivots.push((pivot, row));
     }
-    (pivots, left)
+    Elimination { pivots, left, made_of }
 }
+
+/// The rows that a row was made of, itself one of them.
+fn origins(row: usize, made_of: &[Vec<usize>]) -> BTreeSet<usize> {
+    let (mut found, mut open) = (BTreeSet::from([row]), vec![row]);
+    while let Some(row) = open.pop() {
+        open.extend(made_of[row].iter().copied().filter(|other| found.insert(*other)));
+    }
+    found
+}
+
+/// A row over states alone.
+#[derive(Clone)]
+struct Left {
+    row: Row,
+    /// The algebraic row that became it, and all that it follows from.
+    origin: usize,
+    from: BTreeSet<usize>,
+}
+
+/// Rows by the states that they make dependent.
+type Dependents = Vec<(usize, Left)>;
 
 /// Of rows over states alone: each non-empty one makes the least preferred state dependent that it can. Returns
 /// reduced constraints with their dependent states, and the empty rows with what they were made of.
-#[allow(clippy::type_complexity)]
-fn dependents(
-    mut rows: Vec<(usize, Row)>,
-    preference: &[usize],
-) -> (Vec<(usize, usize, Row)>, Vec<(usize, Vec<usize>)>) {
+fn dependents(mut rows: Vec<Left>, preference: &[usize]) -> (Dependents, Vec<(usize, Vec<usize>)>) {
     let mut taken: Vec<Option<usize>> = vec![None; rows.len()];
     for &state in preference.iter().rev() {
         let best = (0..rows.len())
             .filter(|i| taken[*i].is_none())
             .filter_map(|i| {
-                let largest = rows[i].1.entries.values().fold(0.0f64, |m, e| m.max(e.value.abs()));
-                rows[i].1.value(state).map(|value| (i, value.abs() / largest))
+                let own = value(&rows[i].row, state)?;
+                let largest = rows[i].row.values().fold(0.0f64, |m, e| m.max(e.value.abs()));
+                Some((i, own.abs() / largest))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, _)) = best else { continue };
         taken[i] = Some(state);
-        let pivot = rows[i].1.clone();
-        let at = pivot.value(state).unwrap_or(1.0);
-        for (other, (_, row)) in rows.iter_mut().enumerate() {
+        let pivot = rows[i].clone();
+        let at = value(&pivot.row, state).unwrap_or(1.0);
+        for (other, left) in rows.iter_mut().enumerate() {
             if other != i
-                && let Some(value) = row.value(state)
+                && let Some(own) = value(&left.row, state)
             {
-                row.subtract(value / at, &pivot, state);
+                subtract(&mut left.row, own / at, &pivot.row, state, &mut |_, _| {});
+                left.from.extend(pivot.from.iter().copied());
             }
         }
     }
     let (mut constraints, mut idle) = (vec![], vec![]);
-    for ((origin, row), taken) in rows.into_iter().zip(taken) {
+    for (left, taken) in rows.into_iter().zip(taken) {
         match taken {
-            Some(state) => constraints.push((state, origin, row)),
-            None => idle.push((origin, row.from.into_iter().collect())),
+            Some(state) => constraints.push((state, left)),
+            None => idle.push((left.origin, left.from.into_iter().collect())),
         }
     }
     (constraints, idle)

@@ -175,6 +175,11 @@ impl<F: Modular> Reading<'_, F> {
                 (None, None) => Err(Trouble::Nonlinear),
             },
             Binary::Divide => match b.as_number() {
+                // Where the divisor is 0 by the structure, as the difference of a source and what it sets, every draw
+                // has this quotient: no number, but the same thing on both sides.
+                Some(divisor) if divisor.is_zero() && a.as_number().is_some() => {
+                    self.opaque(&op, &[a, b])
+                }
                 Some(b) if b.is_zero() => Err(Trouble::Zero),
                 Some(b) => Ok(a.times(F::ONE / b)),
                 None => Err(Trouble::Nonlinear),
@@ -199,7 +204,7 @@ impl<F: Modular> Reading<'_, F> {
             (Some(n), Some(x)) if n.fract() == 0.0 && n.abs() <= LARGEST => {
                 let size = x.pow(n.abs() as u64);
                 match (n < 0.0, size.is_zero()) {
-                    (true, true) => Err(Trouble::Zero),
+                    (true, true) => self.opaque(&Binary::Power, &[base, exponent]),
                     (true, false) => Ok(Form::number(F::ONE / size)),
                     (false, _) => Ok(Form::number(size)),
                 }
