@@ -83,8 +83,9 @@ fn a_model_is_the_graph_that_it_holds() {
          signal i = f(armature)\n{run_line}\
          observe f(rotor), e(U), f(rotor -> load), power(rotor -> load), i, p(L)\n"
     ));
-    // The same equations in the same order: the same numbers.
-    assert_eq!(apart(&flat, &inside), 0.0);
+    // The same equations; a subcircuit puts devices into another order, which rounding shows.
+    let apart = apart(&flat, &inside);
+    assert!(apart < 1e-9, "{apart:e}");
 }
 
 #[test]
