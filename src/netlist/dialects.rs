@@ -226,8 +226,8 @@ pub const DIALECTS: &[Dialect] = &[
         save: "",
         // Its voltage sources have a resistance, by default 10 µΩ, too much where amperes are hundreds of rad/s. But a
         // gyrator of two sources that take each other's current stands in its matrix with the square of the inverse, of
-        // which 1e-9 Ω leave no digit. Its nodes and charges have floors far above what is usual in hydraulics.
-        options: (None, &["short=3e-7", "gmin=1e-20", "abstol=1e-18", "chgtol=1e-25", "numdgt=9"]),
+        // which 1e-9 Ω leave no digit and 1e-6 two. Its nodes and charges have floors far above what is usual in hydraulics.
+        options: (None, &["short=3e-6", "gmin=1e-20", "abstol=1e-18", "chgtol=1e-25", "numdgt=9"]),
         linked_to_any: false,
         phases: false,
         nested: false,
