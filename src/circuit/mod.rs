@@ -407,6 +407,60 @@ pub enum Analysis {
         drive: Drive,
         roots: Roots,
     },
+    /// How outputs change with parameters.
+    Sensitivity(Sensitivity),
+}
+
+/// What changes with what.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensitivity {
+    /// What changes.
+    pub outputs: Vec<Output>,
+    /// Parameters and values of devices by their names, and what they are.
+    pub parameters: Vec<(String, f64)>,
+    /// Where: at an operating point, over values, frequencies or times.
+    pub of: Box<Analysis>,
+    /// By which way.
+    pub gradients: Gradients,
+}
+
+impl Sensitivity {
+    /// Whether a run over time begins with stated charges.
+    pub fn starts_from_charges(&self) -> bool {
+        matches!(*self.of, Analysis::Transient { uic: true, .. })
+    }
+}
+
+/// How slopes are worked out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gradients {
+    /// By the adjoint, and headed without saying so.
+    Plain,
+    /// A solution for each parameter.
+    Direct,
+    /// A solution for each output.
+    Adjoint,
+    /// Both, one beside the other.
+    Both,
+}
+
+impl Gradients {
+    /// Whether solutions for parameters are wanted.
+    pub fn direct(self) -> bool {
+        matches!(self, Gradients::Direct | Gradients::Both)
+    }
+
+    /// Whether solutions for outputs are wanted.
+    pub fn adjoint(self) -> bool {
+        self != Gradients::Direct
+    }
+
+    /// Of two values, the direct one first, those that are wanted.
+    pub fn picked<T>(self, direct: T, adjoint: T) -> impl Iterator<Item = T> {
+        let (direct, adjoint) =
+            (self.direct().then_some(direct), self.adjoint().then_some(adjoint));
+        direct.into_iter().chain(adjoint)
+    }
 }
 
 /// What an input is driven by.
@@ -448,6 +502,7 @@ impl Analysis {
             Analysis::Ac { .. } => "ac",
             Analysis::Transfer { .. } => "tf",
             Analysis::PoleZero { .. } => "pz",
+            Analysis::Sensitivity(_) => "sens",
         }
     }
 }

@@ -116,7 +116,11 @@ pub fn ready(
     };
     let before = d.len();
     let point = matches!(wanted, Some(Analysis::OperatingPoint));
-    let timed = matches!(wanted, None | Some(Analysis::Transient { .. }));
+    let timed = match &wanted {
+        None | Some(Analysis::Transient { .. }) => true,
+        Some(Analysis::Sensitivity(own)) => matches!(*own.of, Analysis::Transient { .. }),
+        _ => false,
+    };
     let mut settings = None;
     let mut still = Settings::new(1.0);
     if timed && pick.is_none_or(|name| name == "tran" || wanted.is_some()) {
@@ -242,7 +246,8 @@ impl Run {
     pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Taking) {
         let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
         let own = self.analysis.name();
-        let taken = taken(&self.circuit, self.settings.as_ref());
+        let over_time = self.settings.as_ref().filter(|_| own == "tran");
+        let taken = taken(&self.circuit, over_time);
         let mut measuring = Measuring::new(sink, taken, own, &self.all, times);
         let result = self.analyse(&mut measuring);
         let (measured, harmonics) = measuring.finish();

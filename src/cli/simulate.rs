@@ -45,7 +45,7 @@ pub struct Arguments {
     /// Rows at exactly these times, one a line, in seconds; in .ac at these frequencies in Hz
     #[arg(long, value_name = "FILE", conflicts_with = "step")]
     times: Option<String>,
-    /// Which analysis of a netlist to run (op, dc, ac, tf, pz, tran); without it the last
+    /// Which analysis of a netlist to run (op, dc, ac, tf, pz, sens, tran); without it the last
     #[arg(long, value_name = "KIND")]
     analysis: Option<String>,
     #[command(flatten)]

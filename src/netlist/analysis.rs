@@ -29,6 +29,26 @@ pub enum Analysis {
         /// What is asked for.
         roots: Roots,
     },
+    /// `.sens`.
+    Sensitivity {
+        /// What changes, as written and read.
+        outputs: Vec<(String, Expr)>,
+        /// With what; `None`: with every value of a device.
+        parameters: Option<Vec<(Name, Span)>>,
+        /// Where.
+        over: Over,
+    },
+}
+
+/// Where sensitivities are taken.
+#[derive(Clone, Debug)]
+pub enum Over {
+    /// At the operating point: ngspice's.
+    Rest,
+    /// Over frequencies: ngspice's.
+    Frequencies(Points),
+    /// Wherever the deck's other analysis goes: Xyce's.
+    Other,
 }
 
 /// A quantity and its values, or the rows of a table.
@@ -90,6 +110,7 @@ pub enum Print {
     OperatingPoint,
     Transfer,
     PoleZero,
+    Sensitivity,
     /// `.save`, and `.probe`: of every analysis.
     Any,
 }
@@ -104,6 +125,7 @@ impl Print {
             Print::OperatingPoint => "op",
             Print::Transfer => "tf",
             Print::PoleZero => "pz",
+            Print::Sensitivity => "sens",
         }
     }
 }
@@ -129,6 +151,23 @@ impl Spelling<'_> {
             }
             Analysis::Transfer { output, source } => {
                 vec![word(".tf"), output.0.clone(), self.name(*source)]
+            }
+            Analysis::Sensitivity { outputs, parameters, over } => {
+                let names: Vec<String> = outputs.iter().map(|(text, _)| text.clone()).collect();
+                let mut words = vec![word(".sens")];
+                match over {
+                    Over::Other => words.push(format!("objfunc={}", names.join(","))),
+                    _ => words.extend(names),
+                }
+                if let Over::Frequencies(points) = over {
+                    words.push(word("ac"));
+                    words.extend(self.frequencies(points));
+                }
+                if let Some(parameters) = parameters {
+                    let names = parameters.iter().map(|(name, _)| self.name(*name));
+                    words.push(format!("param={}", names.collect::<Vec<_>>().join(",")));
+                }
+                words
             }
             Analysis::PoleZero { input, output, drive, roots } => {
                 let drive = match drive {
@@ -212,6 +251,12 @@ pub(super) fn expressions_mut(analysis: &mut Analysis, visit: &mut dyn FnMut(&mu
         Analysis::Ac(points) => points_mut(points, visit),
         Analysis::Transfer { output, .. } => visit(&mut output.1),
         Analysis::PoleZero { .. } => {}
+        Analysis::Sensitivity { outputs, over, .. } => {
+            outputs.iter_mut().for_each(|(_, value)| visit(value));
+            if let Over::Frequencies(points) = over {
+                points_mut(points, visit);
+            }
+        }
     }
 }
 

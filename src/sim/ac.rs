@@ -67,15 +67,7 @@ impl Probed {
                 }
             });
         }
-        let leaf = |probe: &Probe| match *probe {
-            Probe::Voltage(a, b) => Leaf::Voltage(a, b),
-            Probe::Current(id) => Leaf::Current(id),
-        };
-        let read = probes
-            .iter()
-            .enumerate()
-            .map(|(k, probe)| Output { name: k.to_string(), expr: Expr::leaf(leaf(probe)) });
-        let circuit = Circuit { outputs: read.collect(), watched: vec![], ..circuit.clone() };
+        let circuit = Circuit { outputs: reads(&probes), watched: vec![], ..circuit.clone() };
         let mut d = vec![];
         let stamps = stamps::stamp(&circuit, &mut d);
         let system = stamps.and_then(|stamps| compile_linear(&stamps, &mut d));
@@ -83,6 +75,17 @@ impl Probed {
         let linear = Linear::of(&system)?;
         let outputs = outputs.iter().map(|output| output.expr.clone()).collect();
         Ok(Probed { system, linear, probes, outputs })
+    }
+
+    /// The probes as outputs.
+    pub fn reads(&self) -> Vec<Output> {
+        reads(&self.probes)
+    }
+
+    /// The value of a probe among those of all.
+    pub fn at(&self, probe: Probe, values: &[Complex]) -> Complex {
+        let found = self.probes.iter().position(|known| *known == probe);
+        found.and_then(|k| values.get(k)).copied().unwrap_or_default()
     }
 
     /// Values of the columns at s.
@@ -93,10 +96,7 @@ impl Probed {
             row.extend(values.iter().flat_map(|value| [value.re, value.im]));
             return;
         }
-        let at = |probe: Probe| {
-            let found = self.probes.iter().position(|known| *known == probe);
-            found.map_or(Complex::default(), |k| values[k])
-        };
+        let at = |probe: Probe| self.at(probe, &values);
         for expr in &self.outputs {
             let value = phasor::evaluate(expr, &at);
             row.push(value.re);
@@ -105,6 +105,17 @@ impl Probed {
             }
         }
     }
+}
+
+/// Probes as outputs.
+fn reads(probes: &[Probe]) -> Vec<Output> {
+    let leaf = |probe: &Probe| match *probe {
+        Probe::Voltage(a, b) => Leaf::Voltage(a, b),
+        Probe::Current(id) => Leaf::Current(id),
+    };
+    let read =
+        |(k, probe): (usize, &Probe)| Output { name: k.to_string(), expr: Expr::leaf(leaf(probe)) };
+    probes.iter().enumerate().map(read).collect()
 }
 
 /// Runs over the frequencies.

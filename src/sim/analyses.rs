@@ -4,7 +4,7 @@ use super::explain::{Failure, FailureKind};
 use super::settings::Settings;
 use super::statistics::Statistics;
 use super::system::System;
-use super::{ac, dc, poles, step, transfer};
+use super::{ac, dc, poles, sensitivity, step, transfer};
 use crate::circuit::stamps::Stamps;
 use crate::circuit::{Analysis, Axis, Circuit};
 use crate::diagnostic::Diagnostic;
@@ -91,6 +91,13 @@ pub const ANALYSES: &[Row] = &[
         about: "poles and zeros, linearised at the operating point",
         columns: |analysis, _, _| poles::columns(analysis),
         run: poles::poles,
+    },
+    Row {
+        name: "sens",
+        card: ".sens v(out) [ac dec n from to] | .sens objfunc={…} param=r1:r,…",
+        about: "slopes of outputs by parameters and values of devices",
+        columns: |analysis, _, _| sensitivity::columns(analysis),
+        run: sensitivity::sensitivity,
     },
     Row {
         name: "tran",

@@ -80,21 +80,8 @@ impl Linear {
     /// # Errors
     /// When there is no operating point, or the circuit holds samples at instants.
     pub fn of(system: &System) -> Result<Linear, Failure> {
-        let mut network = Network::new(system, 0.0, 0.0);
-        step::set_to_dc(&mut network);
-        network.start_modes(0.0);
-        let mut state = op::initial_values(&mut network, 0.0);
         // What is linear is the same everywhere.
-        if !system.is_linear() || !system.modes.is_empty() {
-            let floors = op::floors(&network);
-            let mut work = Work::new(system.equations(), system.charges());
-            past::at_rest(&mut network, &mut state, |network, state| {
-                op::operating_point(network, state, &floors, &mut vec![], &mut work.scratch)
-            })
-            .map_err(|trouble| {
-                failure(system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
-            })?;
-        }
+        let (network, state) = rest(system, !system.is_linear() || !system.modes.is_empty())?;
         Linear::at(network, &state.x)
     }
 
@@ -156,6 +143,25 @@ impl Linear {
             }
         }
         b
+    }
+
+    /// (G + sC − ΣD·e^(−sT))·x − B·u: what is left of the equations.
+    pub fn misfit(&self, s: Complex, x: &[Complex]) -> Vec<Complex> {
+        let mut left: Vec<Complex> = self.phasors().into_iter().map(|b| -b).collect();
+        let mut add = |list: &[(u32, u32, f64)], factor: Complex| {
+            for (row, column, value) in list {
+                let term = factor * x[*column as usize].scaled(*value);
+                left[*row as usize] = left[*row as usize] + term;
+            }
+        };
+        add(&self.conductances, Complex::ONE);
+        add(&self.storages, s);
+        for delay in &self.delays {
+            let (sine, cosine) = libm::sincos(-s.im * delay.by);
+            let size = libm::exp(-s.re * delay.by);
+            add(&delay.entries, -Complex::new(size * cosine, size * sine));
+        }
+        left
     }
 
     /// Right-hand side of a unit of one source; `None` when the circuit has no such source.
@@ -264,6 +270,25 @@ impl Pencil {
         }
         statistics.solves += 2;
     }
+}
+
+/// A network and its state at the operating point, which is sought only where it matters.
+pub(super) fn rest(system: &System, sought: bool) -> Result<(Network<'_>, op::State), Failure> {
+    let mut network = Network::new(system, 0.0, 0.0);
+    step::set_to_dc(&mut network);
+    network.start_modes(0.0);
+    let mut state = op::initial_values(&mut network, 0.0);
+    if sought {
+        let floors = op::floors(&network);
+        let mut work = Work::new(system.equations(), system.charges());
+        past::at_rest(&mut network, &mut state, |network, state| {
+            op::operating_point(network, state, &floors, &mut vec![], &mut work.scratch)
+        })
+        .map_err(|trouble| {
+            failure(system, Moment::OperatingPoint, 0.0, &trouble, &network.statistics)
+        })?;
+    }
+    Ok((network, state))
 }
 
 /// Why a linear circuit cannot be solved at a frequency.

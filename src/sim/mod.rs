@@ -25,6 +25,8 @@ mod poles;
 mod reduce;
 mod remarks;
 mod search;
+mod sensitivity;
+mod sensitivity_in_time;
 mod settings;
 mod statistics;
 mod step;

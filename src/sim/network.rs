@@ -619,6 +619,13 @@ impl<'a> Network<'a> {
         found
     }
 
+    /// ∂Q/∂x as triplets (charge, unknown, slope), with the derivatives of the last linearisation.
+    pub fn storage_slopes(&self) -> Triplets {
+        let all = 0..self.system.charges();
+        all.flat_map(|k| self.charge_slopes(k).map(move |(x, slope)| (k as u32, x, slope)))
+            .collect()
+    }
+
     /// ∂Q_k/∂x, with the derivatives of the last linearisation.
     fn charge_slopes(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let linear = self.system.charges.row(k).map(|(column, c)| (column as u32, c));

@@ -46,6 +46,8 @@ pub fn analysis(
             }
             Some(circuit::Analysis::Transfer { output: output?, source: device })
         }
+        // Follows from the others.
+        Analysis::Sensitivity { .. } => None,
         Analysis::PoleZero { input, output, drive, roots } => {
             let mut pair = |names: &[Name; 2]| {
                 let [a, b] = names.map(|name| lookup.node(TOP, name, span, d));
@@ -191,7 +193,7 @@ fn points(
 }
 
 /// Frequencies, which are above 0 or 0 itself.
-fn frequencies(
+pub fn frequencies(
     flat: &Flat,
     given: &analysis::Points,
     span: Span,

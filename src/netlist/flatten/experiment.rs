@@ -6,7 +6,7 @@ use super::scope::{self, TOP};
 use super::values::Lookup;
 use crate::circuit::{self, Analysis, Circuit, NodeId, Output};
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::netlist::analysis::Print;
+use crate::netlist::analysis::{Analysis as WantedAnalysis, Print};
 use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
 use crate::netlist::read::expression::expression;
@@ -57,10 +57,18 @@ pub fn settings(
                     analyses.push(Analysis::Transient { step, stop, start, hmax, uic: *uic });
                 }
             }
+            CardKind::Analysis(WantedAnalysis::Sensitivity { .. }) => {}
             CardKind::Analysis(wanted) => {
                 analyses.extend(super::analyses::analysis(flat, wanted, card.span, d));
             }
             _ => {}
+        }
+    }
+    let ways = super::sensitivity::ways(&mut options);
+    for card in &flat.live {
+        if let CardKind::Analysis(wanted @ WantedAnalysis::Sensitivity { .. }) = &card.kind {
+            let made = super::sensitivity::analysis(flat, wanted, &analyses, ways, card.span, d);
+            analyses.extend(made);
         }
     }
     if header.hmax_auto {
@@ -201,6 +209,7 @@ fn print_of(analysis: &Analysis) -> Print {
         Analysis::Ac { .. } => Print::Ac,
         Analysis::Transfer { .. } => Print::Transfer,
         Analysis::PoleZero { .. } => Print::PoleZero,
+        Analysis::Sensitivity(_) => Print::Sensitivity,
     }
 }
 

@@ -17,6 +17,7 @@ mod analyses;
 mod experiment;
 mod guess;
 mod measures;
+mod sensitivity;
 mod usage;
 pub mod vary;
 

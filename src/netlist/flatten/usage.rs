@@ -136,6 +136,9 @@ impl Usage {
                     })
                 }
                 CardKind::Analysis(Analysis::Transfer { output, .. }) => self.expr(&output.1),
+                CardKind::Analysis(Analysis::Sensitivity { outputs, .. }) => {
+                    outputs.iter().for_each(|(_, expr)| self.expr(expr));
+                }
                 CardKind::Analysis(Analysis::PoleZero { input, output, .. }) => {
                     input.iter().chain(output).for_each(|node| self.count(*node));
                 }

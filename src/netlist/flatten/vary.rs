@@ -97,6 +97,13 @@ impl Variation {
     }
 }
 
+/// The value of a `.model` of the top that `model:key` names.
+pub fn model_value<'n>(netlist: &'n Netlist, text: &str) -> Option<&'n Expr> {
+    let (path, key) = text.rsplit_once(':')?;
+    let (_, parameters) = model(netlist, netlist.names.find(path)?)?;
+    parameters.iter().find(|(own, _)| own.eq_ignore_ascii_case(key)).map(|(_, value)| value)
+}
+
 fn is_parameter(netlist: &Netlist, name: Name) -> bool {
     netlist.cards.iter().any(|card| match &card.kind {
         CardKind::Parameters(parameters) => parameters.iter().any(|(own, _)| *own == name),

@@ -183,7 +183,7 @@ pub fn ac(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
 }
 
 /// `lin|dec|oct n from to`, `list …`, `data=…`.
-fn frequencies(reader: &mut Reader, cursor: &mut Cursor) -> Option<Points> {
+pub fn frequencies(reader: &mut Reader, cursor: &mut Cursor) -> Option<Points> {
     if let Some((name, _)) = table(reader, cursor)? {
         return Some(Points::Table(name));
     }
@@ -294,6 +294,7 @@ pub fn print(word: &str) -> Option<Print> {
         "op" => Print::OperatingPoint,
         "tf" => Print::Transfer,
         "pz" => Print::PoleZero,
+        "sens" => Print::Sensitivity,
         _ => return None,
     })
 }

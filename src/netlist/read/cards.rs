@@ -52,7 +52,7 @@ pub const CARDS: &[(&str, Treatment)] = &[
     ("ac", Read(analyses::ac)),
     ("tf", Read(analyses::transfer)),
     ("pz", Read(analyses::pole_zero)),
-    ("sens", Refused(ANALYSIS)),
+    ("sens", Read(super::sensitivity::sensitivity)),
     ("step", Read(analyses::step)),
     ("data", Read(analyses::data)),
     ("enddata", Read(|_, _| None)),

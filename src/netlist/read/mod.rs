@@ -17,6 +17,7 @@ pub mod cursor;
 pub mod expression;
 pub mod calls;
 mod files;
+mod sensitivity;
 pub mod waveforms;
 pub mod passive;
 pub mod linked;

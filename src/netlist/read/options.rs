@@ -42,6 +42,8 @@ const KEYS: &[(&str, &str, &[&str])] = &[
     ("device", "gmin", &["gmin"]),
     ("device", "smoothbsrc", &["smoothbsrc"]),
     ("device", "rcconst", &["rcconst"]),
+    ("sensitivity", "direct", &["sensitivity_direct"]),
+    ("sensitivity", "adjoint", &["sensitivity_adjoint"]),
     ("output", "initial_interval", &["initial_interval"]),
 ];
 
