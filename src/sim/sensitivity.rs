@@ -125,6 +125,9 @@ pub(super) fn send(
     interrupted(job, statistics).map_or(Ok(()), Err)
 }
 
+/// The vector that a system gives, the systems of a parameter being counted.
+pub(super) type Vector<'a, T> = dyn FnMut(usize, &System) -> Result<Vec<T>, Failure> + 'a;
+
 /// The same circuit moved to both sides of one parameter's value.
 pub(super) struct Moved {
     /// Above and below by each of the steps.
@@ -166,10 +169,7 @@ impl Moved {
     }
 
     /// The slope of a vector that each system gives.
-    pub fn slope<T: Field>(
-        &self,
-        of: &mut dyn FnMut(usize, &System) -> Result<Vec<T>, Failure>,
-    ) -> Result<Vec<T>, Failure> {
+    pub fn slope<T: Field>(&self, of: &mut Vector<T>) -> Result<Vec<T>, Failure> {
         let mut slopes = vec![];
         for (k, ([above, below], part)) in self.systems.iter().zip(STEPS).enumerate() {
             let (above, below) = (of(2 * k, above)?, of(2 * k + 1, below)?);

@@ -85,8 +85,11 @@ fn check(system: &System) -> Result<(), Failure> {
     Ok(())
 }
 
+/// A time, and the unknowns then.
+type Row = (f64, Vec<f64>);
+
 /// Times and unknowns of the rows of a run.
-fn course(job: &Job, plain: &System) -> Result<(Vec<(f64, Vec<f64>)>, Statistics), Failure> {
+fn course(job: &Job, plain: &System) -> Result<(Vec<Row>, Statistics), Failure> {
     let read = |(k, unknown): (usize, &crate::circuit::stamps::Unknown)| {
         let leaf = match unknown.device {
             Some(device) if !unknown.voltage => Leaf::Current(device),

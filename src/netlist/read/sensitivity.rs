@@ -64,10 +64,10 @@ fn listed(reader: &mut Reader, cursor: &mut Cursor) -> Option<Analysis> {
             }
             "objvars" => {
                 for (name, span) in names(reader, cursor)? {
-                    let text = format!("v({})", reader.names.text(name));
-                    let node = reader.node_name(&reader.names.text(name).to_string());
+                    let word = reader.names.text(name).to_string();
+                    let node = reader.node_name(&word);
                     let leaf = crate::expr::Node::Leaf(Leaf::Voltage(node, None));
-                    outputs.push((text, Expr::new(leaf, span)));
+                    outputs.push((format!("v({word})"), Expr::new(leaf, span)));
                 }
             }
             "param" => parameters.extend(names(reader, cursor)?),
