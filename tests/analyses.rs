@@ -97,7 +97,7 @@ fn phases_are_in_the_unit_of_the_dialect() {
 #[test]
 fn parts_of_phasors_within_expressions() {
     let trace = run(
-        "v1 a 0 ac 2\nr1 a b 1k\nc1 b 0 1u\n.param k=3\n.ac list 100 1k\n.print ac {k*vm(b)} {vr(b)*vr(b)+vi(b)*vi(b)} {db(v(b))-vdb(a,b)} par('im(c1)*1k') {vm(a)/vm(b)} {v(b)/v(a)}",
+        "v1 a 0 ac 2\nr1 a b 1k\nc1 b 0 1u\n.param k=3\n.ac list 100 1k\n.print ac {k*vm(b)} {vr(b)*vr(b)+vi(b)*vi(b)} {db(v(b))-vdb(a,b)} par('im(c1)*1k') {vm(a)/vm(b)} {v(b)/v(a)} im(v(b)) {2*im(v(b))} re(v(b))",
     );
     for (k, f) in [100.0f64, 1e3].iter().enumerate() {
         let x = TAU * f * 1e-3;
@@ -112,6 +112,9 @@ fn parts_of_phasors_within_expressions() {
         close("im(c1)*1k", x * size);
         close("{vm(a)/vm(b)}", (1.0 + x * x).sqrt());
         close("{v(b)/v(a)}.re", 1.0 / (1.0 + x * x));
+        close("im(v(b))", -2.0 * x / (1.0 + x * x));
+        close("{2*im(v(b))}", -4.0 * x / (1.0 + x * x));
+        close("re(v(b))", 2.0 / (1.0 + x * x));
     }
     // A function of the deck's own keeps its meaning where outputs do not stand.
     let trace = run(".func vm(x) {7*x}\nv1 a 0 {vm(2)}\nr1 a 0 1\n.op\n.print op v(a)");

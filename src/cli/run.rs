@@ -5,7 +5,7 @@ use super::measures::{self, Measured, Measuring, Taken};
 use super::pipeline::{self, Deck, Language, Units};
 use crate::bond::elaborate::Overrides;
 use crate::circuit::stamps::{self, Stamps};
-use crate::circuit::{Analysis, Axis, Circuit, sweep};
+use crate::circuit::{Analysis, Axis, Circuit, Gradients, Sensitivity, sweep};
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::quantity::nearest;
 use crate::sim::analyses::{self, ANALYSES, Job};
@@ -195,7 +195,7 @@ pub fn ready(
         stamps,
         system,
         settings,
-        analyses: circuit.analyses.len(),
+        analyses: rivals(&circuit, &analysis),
         analysis,
         steps: circuit.steps.clone(),
         circuit,
@@ -203,6 +203,15 @@ pub fn ready(
         native,
         deck: None,
     })
+}
+
+/// Analyses that could be run; the one that sensitivities go along with is none of its own.
+fn rivals(circuit: &Circuit, run: &Analysis) -> usize {
+    let along = |own: &Sensitivity| {
+        own.gradients != Gradients::Plain && *own.of != Analysis::OperatingPoint
+    };
+    let goes_along = matches!(run, Analysis::Sensitivity(own) if along(own));
+    circuit.analyses.len() - usize::from(goes_along)
 }
 
 /// Whether a warning or error has been said, wherever.

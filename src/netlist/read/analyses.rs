@@ -340,11 +340,14 @@ pub fn reading(names: &mut Names, how: &Reading, text: &str) -> Option<Leaf> {
     };
     if let Some((kind, part)) = part(name) {
         let leaf = match (kind, &words[..]) {
-            ('v', words) => voltage(names, words)?,
-            (_, [device]) if plain(device) => Leaf::Current(names.intern(device)),
-            _ => return None,
+            ('v', words) => voltage(names, words),
+            (_, [device]) if plain(device) => Some(Leaf::Current(names.intern(device))),
+            _ => None,
         };
-        return Some(Leaf::Part(phasor_part(part, how.degrees)?, Box::new(leaf)));
+        // `im(v(a))` is the imaginary part of v(a), `im(v1)` the magnitude of a current.
+        if let Some(leaf) = leaf {
+            return Some(Leaf::Part(phasor_part(part, how.degrees)?, Box::new(leaf)));
+        }
     }
     match (name.to_ascii_lowercase().as_str(), &words[..]) {
         ("p" | "w", [device]) if plain(device) => Some(Leaf::Power(names.intern(device))),
