@@ -103,10 +103,12 @@ pub(crate) struct Controls {
     pub left: Vec<f64>,
     pub right: Vec<f64>,
     pub inside: Vec<f64>,
-    /// Values of all laws and guards before and after a change, and the largest magnitudes seen.
+    /// Values of all laws and guards before and after a change, the largest magnitudes of those before in the run, and of
+    /// those after in a step.
     pub before: Vec<f64>,
     pub after: Vec<f64>,
     pub sizes: Vec<f64>,
+    pub other_sizes: Vec<f64>,
 }
 
 impl Controls {
@@ -119,6 +121,7 @@ impl Controls {
             before: vec![],
             after: vec![],
             sizes: vec![],
+            other_sizes: vec![],
         }
     }
 }

@@ -36,6 +36,9 @@ pub(super) enum Located {
     Again,
 }
 
+/// So often a condition may turn out to jump and not to jump within one step.
+const WAVERING: u32 = 6;
+
 /// The search for a crossing: step sizes and how far past the threshold they ended.
 #[derive(Default)]
 pub(super) struct Search {
@@ -81,7 +84,9 @@ impl Run<'_> {
         while let Some(first) = self.first_crossing() {
             let Crossed { mode, root, .. } = self.crossed[first];
             let ramped = self.network.hold(mode) == RAMPED;
-            if ramped || self.is_switch(mode) || self.jumps(mode, root, true) {
+            // One that jumps by about as much as counts may seem to and seem not to, time and again: then it does.
+            let wavers = self.network.hold(mode) == HELD && search.tries >= WAVERING;
+            if ramped || wavers || self.is_switch(mode) || self.jumps(mode, root, true) {
                 if self.network.hold(mode) == FREE {
                     self.network.set_hold(mode, HELD);
                     self.work.linearised = false;
@@ -91,7 +96,7 @@ impl Run<'_> {
             if self.network.hold(mode) == HELD {
                 self.network.set_hold(mode, FREE);
                 self.work.linearised = false;
-                *search = Search { tries: search.tries, ..Search::default() };
+                *search = Search { tries: search.tries + 1, ..Search::default() };
                 return Located::Again;
             }
             self.crossed.swap_remove(first);
@@ -258,6 +263,7 @@ impl Run<'_> {
             (a, b) = events::pair(&controls.right, mode);
         }
         let new = network.next_value(mode, a, b);
+        controls.other_sizes.clear();
         let mut compare = |before: f64, after: f64, tolerance: f64, only_if_finite: bool| {
             for (place, value) in [(before, old), (after, new)] {
                 work.dense.unknowns(place, state, next, &mut work.x);
@@ -270,13 +276,18 @@ impl Run<'_> {
             }
             network.set_mode(mode, old);
             controls.sizes.resize(controls.before.len(), 0.0);
+            controls.other_sizes.resize(controls.before.len(), 0.0);
             let mut finite = true;
             let mut jump = false;
             let sides = controls.before.iter().zip(&controls.after);
-            for ((before, after), size) in sides.zip(controls.sizes.iter_mut()) {
+            let sizes = controls.sizes.iter_mut().zip(&mut controls.other_sizes);
+            for ((before, after), (size, other)) in sides.zip(sizes) {
                 if before.is_finite() && after.is_finite() {
-                    *size = size.max(before.abs()).max(after.abs());
-                    jump |= (before - after).abs() > tolerance * *size;
+                    // What the other value of the mode would make of the unknowns as they are never comes to be: it counts
+                    // in this step only.
+                    *size = size.max(before.abs());
+                    *other = other.max(after.abs());
+                    jump |= (before - after).abs() > tolerance * size.max(*other);
                 } else {
                     finite = false;
                 }
