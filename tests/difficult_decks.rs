@@ -417,8 +417,8 @@ fn rows_between_steps_where_diodes_store_next_to_nothing() {
 /// the current that the switch would carry with the other resistance is a thousand times what it ever carries.
 #[test]
 fn a_switch_without_hysteresis_turns_at_each_crossing() {
-    let deck = "divider\nV1 a 0 SIN(0 1 1k)\nS1 a b a 0 sm\n.model sm SW(vt=0.5 ron=1 roff=1meg)\nR1 b 0 1k\n\
-                .tran 10u 4m\n.print tran v(a) v(b)\n.end\n";
+    let deck = "V1 a 0 SIN(0 1 1k)\nS1 a b a 0 sm\n.model sm SW(vt=0.5 ron=1 roff=1meg)\nR1 b 0 1k\n\
+                .tran 10u 4m\n.print tran v(a) v(b)";
     let times: Vec<f64> = (0..400).map(|k| 1e-5 * f64::from(k) + 3e-6).collect();
     for row in at(deck, &times, &[]) {
         let exact = (2e3 * std::f64::consts::PI * row[0]).sin();
