@@ -74,7 +74,7 @@ pub struct Reading {
 }
 
 impl Linear {
-    /// Linearises a system that was compiled by [`compile_linear`](super::compile::compile_linear) at its operating
+    /// Linearises a system that was compiled by `compile_linear` at its operating
     /// point.
     ///
     /// # Errors

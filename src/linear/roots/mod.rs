@@ -5,13 +5,13 @@
 //! Ehrlich and Aberth:        z_j ← z_j − 1/(p'/p − Σ_{i≠j} 1/(z_j − z_i))
 //! ```
 //!
-//! The number of roots comes from exact arithmetic ([`count`]), so that infinite ones are never mistaken for large ones;
+//! The number of roots comes from exact arithmetic (`count`), so that infinite ones are never mistaken for large ones;
 //! where to begin from how many roots lie within circles, the mean of Re(s·p'/p) along them. Each step factorises the
 //! pencil itself, so that no root suffers from the size of another. (D. A. Bini, V. Noferini, *Solving polynomial
 //! eigenvalue problems by means of the Ehrlich–Aberth method*, 2013.)
 //!
 //! A root of multiplicity k is determined by numbers of 16 figures to 16/k figures only, but the mean of the k roots
-//! that it falls apart into is exact: roots that lie within that distance are told as one, at their mean ([`clusters`]).
+//! that it falls apart into is exact: roots that lie within that distance are told as one, at their mean (`clusters`).
 
 mod clusters;
 mod count;

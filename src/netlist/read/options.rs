@@ -1,6 +1,6 @@
 //! `.options [package] key=value flag …`, in the words of three dialects.
 //!
-//! ngspice and LTspice have one bag of keys. Xyce's come in packages; [`KEYS`] says which of them mean something here, and
+//! ngspice and LTspice have one bag of keys. Xyce's come in packages; `KEYS` says which of them mean something here, and
 //! all others are passed over, with one warning that names them.
 
 use super::{Cursor, Reader};
