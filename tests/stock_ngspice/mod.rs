@@ -1,5 +1,8 @@
 //! Netlists in stock ngspice, and the observed columns of what it computes, by the map.
 
+#[path = "../peers/mod.rs"]
+mod peers;
+
 use bondspice::expr::Expr;
 use bondspice::netlist::write::expression;
 use bondspice::netlist::{Leaf, Netlist};
@@ -9,13 +12,7 @@ use std::process::Command;
 
 /// Whether ngspice is there; where it must be and is not, the test fails.
 pub fn ngspice() -> bool {
-    let found = Command::new("ngspice").arg("--version").output().is_ok();
-    if !found {
-        let required = std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_some_and(|v| v == "1");
-        assert!(!required, "ngspice is missing");
-        eprintln!("skipped: ngspice is missing");
-    }
-    found
+    peers::has("ngspice")
 }
 
 /// The observed columns as ngspice computes them from a text of this netlist.
