@@ -199,7 +199,7 @@ pub enum Waveform {
     Sine { offset: Expr, amplitude: Expr, frequency: Expr, delay: Expr, damping: Expr, phase: Expr },
     /// Straight lines between points, holding the end values; two equal times make a jump.
     Pwl(Vec<(Expr, Expr)>),
-    /// Normal random numbers of mean 0, each held for `dt`; see [`super::noise`].
+    /// Normal random numbers of mean 0, each held for `dt`; see [`crate::quantity::random`].
     #[allow(missing_docs)]
     Noise { seed: Expr, rms: Expr, dt: Expr },
 }

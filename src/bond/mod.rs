@@ -4,7 +4,6 @@ pub mod syntax;
 pub mod elaborate;
 pub mod elements;
 pub mod graph;
-pub mod noise;
 pub mod memory;
 pub mod causality;
 pub mod equations;

@@ -561,7 +561,23 @@ impl Device {
         let name = self.name.to_lowercase();
         match name.rsplit_once('.').and_then(|(_, own)| own.chars().next()) {
             Some(letter) => format!("i({letter}.{name})"),
-            None => format!("i({name})"),
+            None => called('i', &name),
         }
     }
+}
+
+/// `v(out)` of a letter and a name, in lower case. Big decks have a million of them.
+pub(crate) fn called(letter: char, name: &str) -> String {
+    let mut text = String::with_capacity(name.len() + 3);
+    text.push(letter);
+    text.push('(');
+    match name.is_ascii() {
+        true => {
+            text.push_str(name);
+            text.make_ascii_lowercase();
+        }
+        false => text.push_str(&name.to_lowercase()),
+    }
+    text.push(')');
+    text
 }

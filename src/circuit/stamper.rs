@@ -6,7 +6,8 @@ use super::stamps::{
     watched_name,
 };
 use super::{
-    Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
+    self as circuit, Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe,
+    Quantity, Waveform,
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary, Function, slope::slope};
@@ -79,7 +80,7 @@ impl<'a> Stamper<'a> {
     pub fn new(circuit: &'a Circuit, diagnostics: &'a mut Vec<Diagnostic>) -> Stamper<'a> {
         let mut stamps = Stamps::default();
         for node in circuit.nodes.iter().skip(1) {
-            let name = format!("v({})", node.name.to_lowercase());
+            let name = circuit::called('v', &node.name);
             stamps.unknowns.push(Unknown {
                 name,
                 voltage: true,

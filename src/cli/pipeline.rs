@@ -224,7 +224,7 @@ pub fn circuit(
         Language::Bond => model(map, file, overrides, d)?.circuit(d),
         Language::Netlist => {
             let deck = deck(map, file, overrides, d)?;
-            let circuit = deck.circuit(&[], None, d)?;
+            let circuit = deck.circuit(0, &[], None, d)?;
             Some((circuit, deck.units))
         }
     }
@@ -262,14 +262,17 @@ pub fn deck(
 
 impl Deck {
     /// The flat circuit with some names set to other values, for an analysis other than the last where one is named.
+    /// `step` is that of `.step`, from 0 on.
     pub fn circuit(
         &self,
+        step: u64,
         values: &[(&str, f64)],
         analysis: Option<&str>,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Circuit> {
         let mut variation = flatten::Variation::default();
         variation.analysis = analysis.map(String::from);
+        (variation.step, variation.options) = (step, self.overrides.options.clone());
         for (name, value) in values {
             if let Err(error) = variation.set(&self.netlist, name, *value, self.place(name)) {
                 d.push(*error);
@@ -278,7 +281,6 @@ impl Deck {
         }
         let mut circuit = flatten::flatten_with(&self.netlist, &variation, d)?;
         super::deck::set_times(&mut circuit, &self.overrides, d);
-        circuit.options.extend(self.overrides.options.iter().cloned());
         (!has_errors(d)).then_some(circuit)
     }
 

@@ -69,11 +69,11 @@ pub fn prepare(
         return ready(circuit, &units, true, pick, d);
     }
     let deck = pipeline::deck(map, file, overrides, d)?;
-    let mut circuit = deck.circuit(&[], pick, d)?;
+    let mut circuit = deck.circuit(0, &[], pick, d)?;
     if !circuit.steps.is_empty() {
         let steps = std::mem::take(&mut circuit.steps);
         let mut said = vec![];
-        let first = deck.circuit(&pairs(&steps, 0, &mut vec![]), pick, &mut said);
+        let first = deck.circuit(0, &pairs(&steps, 0, &mut vec![]), pick, &mut said);
         let new: Vec<_> = said.into_iter().filter(|found| !says(d, found)).collect();
         d.extend(new);
         circuit = first?;
@@ -266,7 +266,7 @@ impl Run {
     fn analyse(&self, sink: &mut Measuring) -> Result<Statistics, Failure> {
         if self.steps.is_empty() {
             let settings = self.settings.as_ref().unwrap_or(&self.still);
-            return self.one(&self.circuit, &self.stamps, &self.system, settings, &[], sink);
+            return self.one(&self.circuit, &self.stamps, &self.system, settings, (0, &[]), sink);
         }
         let mut total = Statistics::default();
         let mut values = vec![];
@@ -291,9 +291,10 @@ impl Run {
         let base = self.settings.as_ref().unwrap_or(&self.still);
         if step == 0 {
             let mut sink = Stepped { to, row: vec![step as f64] };
-            return self.one(&self.circuit, &self.stamps, &self.system, base, pairs, &mut sink);
+            let at = (step, pairs);
+            return self.one(&self.circuit, &self.stamps, &self.system, base, at, &mut sink);
         }
-        let circuit = self.vary(pairs).map_err(input)?;
+        let circuit = self.vary(step, pairs).map_err(input)?;
         let mut d = vec![];
         let stamps = stamps::stamp(&circuit, &mut d);
         let made =
@@ -311,7 +312,7 @@ impl Run {
         }
         to.follow(taken(&circuit, self.settings.is_some().then_some(&settings)));
         let mut sink = Stepped { to, row: vec![step as f64] };
-        self.one(&circuit, &stamps, &system, &settings, pairs, &mut sink)
+        self.one(&circuit, &stamps, &system, &settings, (step, pairs), &mut sink)
     }
 
     fn one(
@@ -320,14 +321,14 @@ impl Run {
         stamps: &Stamps,
         system: &System,
         settings: &Settings,
-        pairs: &[(&str, f64)],
+        (step, pairs): (u64, &[(&str, f64)]),
         sink: &mut dyn Sink,
     ) -> Result<Statistics, Failure> {
         let name = self.analysis.name();
         let own = circuit.analyses.iter().rev().find(|analysis| analysis.name() == name);
         let vary = |more: &[(&str, f64)]| {
             let all: Vec<(&str, f64)> = pairs.iter().chain(more).copied().collect();
-            self.vary(&all)
+            self.vary(step, &all)
         };
         // Frequencies of the command line stay in every step.
         let own = own.filter(|_| !matches!(self.analysis, Analysis::Ac { .. }));
@@ -340,10 +341,10 @@ impl Run {
     }
 
     /// The circuit with other values.
-    fn vary(&self, pairs: &[(&str, f64)]) -> Result<Circuit, Vec<Diagnostic>> {
+    fn vary(&self, step: u64, pairs: &[(&str, f64)]) -> Result<Circuit, Vec<Diagnostic>> {
         let mut d = vec![];
         let made = match &self.deck {
-            Some(deck) => deck.circuit(pairs, Some(self.analysis.name()), &mut d),
+            Some(deck) => deck.circuit(step, pairs, Some(self.analysis.name()), &mut d),
             None => None,
         };
         made.ok_or(d)

@@ -9,7 +9,8 @@
 use super::functions::Function;
 use super::tree::{Binary, Expr, Node, Table, Unary};
 use crate::source::Span;
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Index of a node of a [`Dag`].
@@ -61,11 +62,11 @@ pub type Affine = (f64, Vec<(u32, f64)>);
 #[derive(Clone, Debug, Default)]
 pub struct Dag {
     ops: Vec<Op>,
-    index: HashMap<Op, NodeId>,
+    index: FxHashMap<Op, NodeId>,
     /// For each node, bit k % 64 for each input k that it depends on: 0 bits are certain.
     pub(super) reach: Vec<u64>,
     tables: Vec<Arc<Table>>,
-    pub(super) derivatives: HashMap<(NodeId, u32), NodeId>,
+    pub(super) derivatives: FxHashMap<(NodeId, u32), NodeId>,
 }
 
 impl Dag {
@@ -295,7 +296,7 @@ impl Dag {
 
     /// The nodes that are needed for some, in ascending order (operands first).
     pub fn below(&self, nodes: &[NodeId]) -> Vec<NodeId> {
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = FxHashSet::default();
         let mut open: Vec<NodeId> = nodes.to_vec();
         while let Some(node) = open.pop() {
             if seen.insert(node) {
@@ -310,7 +311,7 @@ impl Dag {
 
     /// The node as constant + Σ factor·input, where it is that everywhere.
     pub fn affine(&self, node: NodeId) -> Option<Affine> {
-        let mut forms: HashMap<NodeId, (f64, BTreeMap<u32, f64>)> = HashMap::new();
+        let mut forms: FxHashMap<NodeId, (f64, BTreeMap<u32, f64>)> = FxHashMap::default();
         for below in self.below(&[node]) {
             let form = match self.op(below) {
                 Op::Constant(bits) => Some((f64::from_bits(bits), BTreeMap::new())),

@@ -7,7 +7,7 @@ use super::dag::{Dag, NodeId, Op};
 use super::functions::{Function, Value};
 use super::tree::{Binary, Table, Unary};
 use super::values::{max, min, power, sign};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// A compiled set of outputs over inputs.
@@ -50,7 +50,7 @@ impl Program {
     pub fn compile(dag: &Dag, outputs: &[NodeId]) -> Program {
         let nodes = dag.below(outputs);
         let mut program = Program { tables: dag.tables().to_vec(), ..Program::default() };
-        let mut register: HashMap<NodeId, u32> = HashMap::with_capacity(nodes.len());
+        let mut register: FxHashMap<NodeId, u32> = FxHashMap::default();
         for node in &nodes {
             if let Op::Input(k) = dag.op(*node) {
                 register.insert(*node, program.inputs.len() as u32);

@@ -19,7 +19,7 @@ use crate::expr;
 use crate::source::Span;
 use analysis::{Analysis, Data, Print, Sweep};
 pub use names::{Name, Names};
-pub use parts::{Operator, Passive, PassiveKind};
+pub use parts::{Draw, Operator, Passive, PassiveKind};
 
 /// An expression of a netlist.
 pub type Expr = expr::Expr<Leaf>;

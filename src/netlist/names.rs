@@ -13,11 +13,12 @@ pub struct Names {
     text: String,
     /// Where each name ends in `text`, and its hash.
     ends: Vec<(usize, u32)>,
-    /// Open addressing, a power of two in length; `EMPTY` or an index into `ends`.
-    slots: Vec<u32>,
+    /// Open addressing, a power of two in length; `EMPTY`, or an index into `ends` and the hash, which stands here too
+    /// so that names that differ are told apart without a look elsewhere.
+    slots: Vec<(u32, u32)>,
 }
 
-const EMPTY: u32 = u32::MAX;
+const EMPTY: (u32, u32) = (u32::MAX, 0);
 
 impl Names {
     /// The name of a text.
@@ -33,7 +34,7 @@ impl Names {
                 let name = self.ends.len() as u32;
                 self.text.push_str(text);
                 self.ends.push((self.text.len(), hash));
-                self.slots[slot] = name;
+                self.slots[slot] = (name, hash);
                 Name(name)
             }
         }
@@ -76,13 +77,10 @@ impl Names {
         loop {
             match self.slots[slot] {
                 EMPTY => return Err(slot),
-                name => {
-                    let same =
-                        self.ends[name as usize].1 == hash && equal(self.text(Name(name)), text);
-                    if same {
-                        return Ok(Name(name));
-                    }
+                (name, own) if own == hash && equal(self.text(Name(name)), text) => {
+                    return Ok(Name(name));
                 }
+                _ => {}
             }
             slot = (slot + 1) & mask;
         }
@@ -96,7 +94,7 @@ impl Names {
             while self.slots[slot] != EMPTY {
                 slot = (slot + 1) & (size - 1);
             }
-            self.slots[slot] = name as u32;
+            self.slots[slot] = (name as u32, *hash);
         }
     }
 }

@@ -63,6 +63,19 @@ pub enum Operator {
     Waveform(super::Shape),
     /// `table(x, x0, y0, …)` whose points follow from parameters; with plain numbers it is a curve from the start.
     Table,
+    /// A random number, drawn once for each place that it stands in and each instance of that: the how-manieth place.
+    Draw(Draw, u32),
+}
+
+/// What random numbers are drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Draw {
+    /// Normal, of mean 0 and root mean square 1.
+    Normal,
+    /// From −1 to 1, all equally likely.
+    Uniform,
+    /// −1 or 1.
+    Sign,
 }
 
 /// Every leaf of an expression, those within operators too.
@@ -78,7 +91,7 @@ pub fn every_leaf<'a>(expr: &'a Expr, visit: &mut dyn FnMut(&'a Leaf, Span)) {
 /// The expression with each leaf replaced, those within operators too.
 pub fn map_leaves(expr: &Expr, replace: &mut dyn FnMut(&Leaf, Span) -> Expr) -> Expr {
     expr.map(&mut |leaf, span| match leaf {
-        Leaf::Operator(operator, arguments) => {
+        Leaf::Operator(operator, arguments) if !arguments.is_empty() => {
             let arguments = arguments.iter().map(|a| map_leaves(a, replace)).collect();
             Expr::new(Node::Leaf(Leaf::Operator(*operator, arguments)), span)
         }
@@ -89,6 +102,8 @@ pub fn map_leaves(expr: &Expr, replace: &mut dyn FnMut(&Leaf, Span) -> Expr) -> 
 /// Whether an expression changes during a run: it speaks of voltages, currents, time or the past.
 pub fn varies(expr: &Expr) -> bool {
     let mut found = false;
-    expr.leaves(&mut |leaf, _| found |= !matches!(leaf, Leaf::Parameter(_)));
+    let fixed =
+        |leaf: &Leaf| matches!(leaf, Leaf::Parameter(_) | Leaf::Operator(Operator::Draw(..), _));
+    expr.leaves(&mut |leaf, _| found |= !fixed(leaf));
     found
 }

@@ -6,7 +6,7 @@
 
 use super::analysis::Print;
 use super::dialects::{Comments, Dialect, NGSPICE};
-use super::parts::{Operator, varies};
+use super::parts::{Draw, Operator, varies};
 use super::{
     Card, CardKind, Device, Element, Expr, Leaf, Name, Names, Netlist, Source, Waveform, read,
 };
@@ -43,6 +43,9 @@ impl Form<'_> {
             Operator::Transfer => "laplace".to_string(),
             Operator::Table => "table".to_string(),
             Operator::Waveform(shape) => format!("spice_{}", read::waveforms::row(shape).name),
+            Operator::Draw(Draw::Normal, _) => return "agauss(0,1,1)".to_string(),
+            Operator::Draw(Draw::Uniform, _) => return "aunif(0,1)".to_string(),
+            Operator::Draw(Draw::Sign, _) => return "limit(0,1)".to_string(),
         };
         let arguments: Vec<String> = arguments.iter().map(|a| self.expression(a)).collect();
         format!("{name}({})", arguments.join(","))

@@ -7,6 +7,7 @@ mod domain;
 mod nearest;
 mod words;
 mod relations;
+pub mod random;
 
 pub use dimension::Dimension;
 pub use domain::{DOMAINS, Domain, DomainRow};

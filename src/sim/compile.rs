@@ -329,9 +329,9 @@ impl<'a> Builder<'a> {
                 junction,
             });
         }
-        let conductances = Rows::new(n, self.conductances.clone());
-        let charge_rows = Rows::new(charges, self.charge_entries.clone());
-        let rates = Rows::new(charges, self.rate_entries.clone());
+        let conductances = Rows::new(n, &self.conductances);
+        let charge_rows = Rows::new(charges, &self.charge_entries);
+        let rates = Rows::new(charges, &self.rate_entries);
         let dynamic = plan_dynamic(n, time, &conductances, &charge_rows, &rates, &mut groups);
         let (frozen, node_slots, free_slots) =
             plan_frozen(n, stamps.nodes, &conductances, &charge_rows, &rates, &mut groups);
@@ -339,15 +339,7 @@ impl<'a> Builder<'a> {
         let (modes, controls) = self.modes();
         let mode_slots = self.mode_slots();
         let mut dag = Dag::default();
-        let all: Vec<(String, Law)>;
-        let columns = if stamps.outputs.is_empty() {
-            let leaf = |k: usize| Law::leaf(Leaf::Unknown(super::UnknownId(k as u32)));
-            let named = stamps.unknowns.iter().enumerate();
-            all = named.map(|(k, unknown)| (unknown.name.clone(), leaf(k))).collect();
-            &all
-        } else {
-            &stamps.outputs
-        };
+        let columns = &stamps.outputs;
         let mut output_rates = false;
         for (_, law) in columns {
             law.leaves(&mut |leaf, _| output_rates |= matches!(leaf, Leaf::Rate(_)));

@@ -199,6 +199,7 @@ const IGNORED: &[&str] = &[
     "opts",
     "nomod",
     "temp",
+    "seed",
     "smoothbsrc",
     "rcconst",
     "tnom",

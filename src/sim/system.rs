@@ -29,24 +29,44 @@ pub(crate) struct Rows {
 
 impl Rows {
     /// Sorts triplets by row and column; equal places add up in the order given.
-    pub fn new(rows: usize, mut triplets: Vec<(u32, u32, f64)>) -> Rows {
-        triplets.sort_by_key(|(row, column, _)| (*row, *column));
-        let mut result = Rows { starts: vec![0; rows + 1], columns: vec![], values: vec![] };
-        let mut last = None;
-        for (row, column, value) in triplets {
-            if last == Some((row, column)) {
-                if let Some(sum) = result.values.last_mut() {
-                    *sum += value;
-                }
-                continue;
-            }
-            last = Some((row, column));
-            result.columns.push(column);
-            result.values.push(value);
-            result.starts[row as usize + 1] += 1;
+    pub fn new(rows: usize, triplets: &[(u32, u32, f64)]) -> Rows {
+        // Dealt out by row; then each row, which is short, is sorted by itself.
+        let mut ends = vec![0u32; rows + 1];
+        for (row, ..) in triplets {
+            ends[*row as usize + 1] += 1;
         }
         for row in 0..rows {
-            result.starts[row + 1] += result.starts[row];
+            ends[row + 1] += ends[row];
+        }
+        let mut dealt = vec![(0u32, 0.0); triplets.len()];
+        for (row, column, value) in triplets {
+            let at = &mut ends[*row as usize];
+            dealt[*at as usize] = (*column, *value);
+            *at += 1;
+        }
+        // Now `ends[row]` is where the row ends.
+        let mut result = Rows {
+            starts: Vec::with_capacity(rows + 1),
+            columns: Vec::with_capacity(triplets.len()),
+            values: Vec::with_capacity(triplets.len()),
+        };
+        result.starts.push(0);
+        let mut from = 0;
+        for end in &ends[..rows] {
+            let row = &mut dealt[from..*end as usize];
+            from = *end as usize;
+            row.sort_by_key(|(column, _)| *column);
+            let first = result.columns.len();
+            for (column, value) in row {
+                match result.values.last_mut() {
+                    Some(sum) if result.columns[first..].last() == Some(column) => *sum += *value,
+                    _ => {
+                        result.columns.push(*column);
+                        result.values.push(*value);
+                    }
+                }
+            }
+            result.starts.push(result.columns.len() as u32);
         }
         result
     }

@@ -9,11 +9,12 @@ use crate::bond::graph::{
     BondGraph, Expr as GraphExpr, Initial, Leaf, Memory, SignalId, SignalLaw, SignalOrigin,
     VertexId, Waveform,
 };
-use crate::bond::{memory, noise};
+use crate::bond::memory;
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Node};
 use crate::netlist::header::{Jumps, Sample};
 use crate::netlist::{self, Card, CardKind, Element, Expr, Name, Shape};
+use crate::quantity::random;
 use crate::source::Span;
 
 /// What a rise of 0 becomes for other simulators, in output intervals.
@@ -351,7 +352,7 @@ impl Builder<'_> {
                 let rise = rise.min(RISE * dt);
                 let mut arguments = vec![];
                 for k in 0..=(until / dt).floor() as u64 {
-                    let (begin, level) = (k as f64 * dt, rms * noise::normal(seed, k));
+                    let (begin, level) = (k as f64 * dt, rms * random::normal(seed, k));
                     let begin = if k > 0 { begin + rise } else { begin };
                     let end = (k + 1) as f64 * dt;
                     arguments.extend([begin, level, end, level].map(Expr::number));

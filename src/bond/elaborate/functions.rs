@@ -16,7 +16,7 @@
 //! | `sample(x, T)` | y(t) = x(k·T) for k·T ≤ t < (k + 1)·T, as x is just after k·T |
 //! | `rate(x, up, down, tau)` | z' = clamp((x − z)/tau, −down, up), z(0) = x(0), y = z + tau·z': y = x while x moves slowly enough; else y moves by `up` or `down` a second, up to up·tau (down·tau) ahead. Without `tau` a millionth of the run |
 //! | `hysteresis(x, low, high)` | 1 from when x rises above `high`, 0 from when it falls below `low`, 0 at first in between |
-//! | `noise(seed, rms, dt)` | normal random numbers of mean 0, each held for `dt`: see [`crate::bond::noise`] |
+//! | `noise(seed, rms, dt)` | normal random numbers of mean 0, each held for `dt`: see [`crate::quantity::random`] |
 //! | `compare(a, b)` | 1 where a > b, else 0 |
 //! | `pwm(duty, f)` | 1 while frac(f·t) < duty, else 0: duty against a saw tooth |
 

@@ -4,7 +4,7 @@
 //! smooth piece; the piece is chosen by a time strictly `inside` the segment and may then be evaluated at either end
 //! of it, so that neither the value before a jump nor the one after it depends on how a corner was rounded.
 
-use crate::bond::noise;
+use crate::quantity::random;
 use std::f64::consts::TAU;
 
 /// Periods of a pulse train whose corners are listed; a run with more would not end anyway.
@@ -63,7 +63,7 @@ impl Wave {
                 offset + amplitude * (-u * damping).exp() * (TAU * frequency * u + phase).sin()
             }
             Wave::Noise { seed, rms, dt } => {
-                rms * noise::normal(*seed, (inside / dt).floor().max(0.0) as u64)
+                rms * random::normal(*seed, (inside / dt).floor().max(0.0) as u64)
             }
             Wave::Pwl(points) => {
                 let next = points.partition_point(|(at, _)| *at <= inside);

@@ -10,7 +10,7 @@ use crate::netlist::read::number;
 use crate::netlist::{
     Branch, Card, CardKind, Device, Element, Expr, Leaf, Name, Netlist, Subcircuit,
 };
-use crate::quantity::nearest;
+use crate::quantity::{nearest, random};
 use crate::source::Span;
 use std::cell::RefCell;
 
@@ -93,8 +93,10 @@ pub fn expand_with<'n>(
         quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());
-    flat.scopes.temperature =
-        variation.temperature.or_else(|| stated_temperature(netlist)).unwrap_or(ROOM);
+    let stated = |key: &str| stated(netlist, variation, key);
+    flat.scopes.temperature = variation.temperature.or_else(|| stated("temp")).unwrap_or(ROOM);
+    let seed = stated("seed").filter(|seed| *seed >= 0.0).unwrap_or(1.0);
+    flat.scopes.seed = random::below(seed as u64, &format!("step {}", variation.step));
     let ground = netlist.names.find("0");
     let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
@@ -123,14 +125,14 @@ pub fn expand_with<'n>(
     flat
 }
 
-/// The circuit's temperature in °C, where an option states it. One that cannot be read is told of elsewhere.
-fn stated_temperature(netlist: &Netlist) -> Option<f64> {
+/// The number that an option states. One that cannot be read is told of elsewhere.
+fn stated(netlist: &Netlist, variation: &Variation, key: &str) -> Option<f64> {
     let numbers = netlist.dialect.reading().numbers;
-    let options = netlist.cards.iter().filter_map(|card| match &card.kind {
+    let cards = netlist.cards.iter().filter_map(|card| match &card.kind {
         CardKind::Options(options) => Some(options),
         _ => None,
     });
-    let texts = options.flatten().filter(|(key, _)| key == "temp");
+    let texts = cards.flatten().chain(&variation.options).filter(|(own, _)| own == key);
     let values = texts.filter_map(|(_, text)| number::number(text, numbers));
     values.map(|read| read.value).reduce(|_, last| last)
 }
@@ -313,7 +315,7 @@ impl<'n> Expander<'n> {
         let Scope { nodes: known, path, .. } = scopes.get_mut(id);
         *known.entry(name).or_insert_with(|| {
             let text = self.flat.netlist.names.text(name);
-            nodes.push(Node { name: format!("{path}{text}"), nominal: None, span });
+            nodes.push(Node { name: [path, text].concat(), nominal: None, span });
             NodeId(nodes.len() as u32 - 1)
         })
     }

@@ -18,10 +18,11 @@ use std::collections::{HashMap, HashSet};
 /// The tolerance where it is elsewhere a part of each present value, rather than of the largest so far.
 const PRESENT: &str = "1e-4";
 
-/// Analyses, and options with those of the header last.
+/// Analyses, and options: those of the netlist, of its header, and `own`, the last of which count.
 pub fn settings(
     flat: &Flat,
     header: &Header,
+    own: &[(String, String)],
     d: &mut Vec<Diagnostic>,
 ) -> (Vec<Analysis>, Vec<(String, String)>) {
     let mut analyses = vec![];
@@ -75,6 +76,7 @@ pub fn settings(
         options.push(("hmax".into(), "auto".into()));
     }
     options.extend(header.options.iter().cloned());
+    options.extend(own.iter().cloned());
     (analyses, options)
 }
 

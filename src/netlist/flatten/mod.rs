@@ -47,7 +47,7 @@ pub fn flatten_with(
     }
     usage::check(netlist, &header, diagnostics);
     let mut flat = expand::expand_with(netlist, variation, diagnostics);
-    let (analyses, options) = experiment::settings(&flat, &header, diagnostics);
+    let (analyses, options) = experiment::settings(&flat, &header, &variation.options, diagnostics);
     let steps = analyses::steps(&flat, diagnostics);
     let picked = variation.analysis.as_deref();
     let run = analyses

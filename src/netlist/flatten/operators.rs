@@ -1,6 +1,6 @@
 //! What laws say of values over time: each becomes a quantity of its own, which the law then reads.
 
-use super::scope::ScopeId;
+use super::scope::{self, ScopeId};
 use super::sources;
 use super::transfer;
 use super::values::Lookup;
@@ -31,6 +31,10 @@ impl Lookup<'_, '_> {
         span: Span,
         d: &mut Vec<Diagnostic>,
     ) -> Option<circuit::Expr> {
+        if let Operator::Draw(draw, place) = operator {
+            let value = scope::draw(&self.flat.scopes, id, draw, place);
+            return Some(circuit::Expr::number(value));
+        }
         if let Operator::Waveform(shape) = operator {
             let mut values = vec![];
             for argument in arguments {
@@ -81,7 +85,7 @@ impl Lookup<'_, '_> {
                 }
             }
             Operator::Transfer => transfer::realise(self, id, law, arguments.get(1)?, span, d)?,
-            Operator::Waveform(_) | Operator::Table => return None,
+            Operator::Waveform(_) | Operator::Table | Operator::Draw(..) => return None,
         })
     }
 

@@ -3,35 +3,13 @@
 use crate::circuit::{DeviceId, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::parts::every_leaf;
-use crate::netlist::{Card, Expr, Leaf, Name, Names, Subcircuit};
-use crate::quantity::nearest;
+use crate::netlist::{Card, Draw, Expr, Leaf, Name, Names, Operator, Subcircuit};
+use crate::quantity::{nearest, random};
 use crate::source::Span;
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-
-/// Names are small integers: one multiplication spreads them enough.
-#[derive(Default)]
-pub struct NameHasher(u64);
-
-impl Hasher for NameHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.write_u32(u32::from(*byte));
-        }
-    }
-
-    fn write_u32(&mut self, value: u32) {
-        self.0 = (self.0.rotate_left(5) ^ u64::from(value)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.0 ^= self.0 >> 29;
-    }
-}
+use rustc_hash::FxHashMap;
 
 /// A table by names. Never walked, so that no order of a hash shows.
-pub type Table<V> = HashMap<Name, V, BuildHasherDefault<NameHasher>>;
+pub type Table<V> = FxHashMap<Name, V>;
 
 /// Index of a scope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +50,8 @@ pub struct Scopes<'n> {
     pub globals: Table<()>,
     /// The temperature of the circuit, in °C.
     pub temperature: f64,
+    /// Where random values come from: that of the netlist and its step.
+    pub seed: u64,
 }
 
 /// The temperature where nothing is said, in °C.
@@ -133,6 +113,7 @@ pub fn varies(scopes: &Scopes, id: ScopeId, expr: &Expr) -> bool {
     expr.leaves(&mut |leaf, _| {
         found |= match leaf {
             Leaf::Parameter(name) => scopes.varying(id, *name).is_some(),
+            Leaf::Operator(Operator::Draw(..), _) => false,
             _ => true,
         }
     });
@@ -281,6 +262,7 @@ pub fn number(
                 let known = scopes.value(id, *name, names).is_some();
                 (!known).then(|| unknown_parameter(scopes, id, *name, span, names, look))
             }
+            Leaf::Operator(Operator::Draw(..), _) => None,
             _ => Some(
                 Diagnostic::error("E0732", span, "this value must be a number")
                     .says("it changes during the run")
@@ -299,8 +281,20 @@ pub fn number(
     }
     Some(expr.evaluate(&mut |leaf| match leaf {
         Leaf::Parameter(name) => scopes.value(id, *name, names).unwrap_or(f64::NAN),
+        Leaf::Operator(Operator::Draw(draw, place), _) => self::draw(scopes, id, *draw, *place),
         _ => f64::NAN,
     }))
+}
+
+/// The random number of a place in a scope.
+pub fn draw(scopes: &Scopes, id: ScopeId, draw: Draw, place: u32) -> f64 {
+    let seed = random::below(scopes.seed, &scopes.get(id).path.to_lowercase());
+    match draw {
+        Draw::Normal => random::normal(seed, u64::from(place)),
+        Draw::Uniform => 2.0 * random::fraction(seed, u64::from(place)) - 1.0,
+        Draw::Sign if random::fraction(seed, u64::from(place)) < 0.5 => -1.0,
+        Draw::Sign => 1.0,
+    }
 }
 
 /// The error for a parameter that nobody defines.

@@ -3,6 +3,7 @@
 use crate::circuit::stamps::{Stamps, stamp};
 use crate::circuit::{Analysis, Circuit, DeviceId, DeviceKind, Leaf, NodeId, Waveform};
 use crate::diagnostic::Diagnostic;
+use crate::netlist::Netlist;
 use crate::netlist::read::{How, read};
 use crate::source::SourceMap;
 
@@ -301,4 +302,95 @@ fn bombs_are_refused() {
     let (circuit, d) = flat(&text);
     assert!(circuit.is_none());
     assert_eq!(d.last().map(|d| d.code), Some("E0737"));
+}
+
+fn netlist(text: &str, dialect: &str) -> Netlist {
+    let mut map = SourceMap::default();
+    let file = map.add("deck.cir", text);
+    let mut d = vec![];
+    let how = How::of(crate::netlist::dialects::find(dialect).unwrap());
+    let netlist = read(&mut map, file, &how, &mut d);
+    assert!(d.is_empty(), "{d:?}");
+    netlist
+}
+
+/// The resistance of a device, in a step, with a seed.
+fn drawn(netlist: &Netlist, step: u64, seed: &str, name: &str) -> f64 {
+    let mut d = vec![];
+    let options = vec![("seed".to_string(), seed.to_string())];
+    let variation = super::Variation { step, options, ..Default::default() };
+    let circuit = super::flatten_with(netlist, &variation, &mut d).unwrap();
+    assert!(d.is_empty(), "{d:?}");
+    match kind(&circuit, name) {
+        DeviceKind::Resistor { resistance } => *resistance,
+        other => panic!("{other:?}"),
+    }
+}
+
+const RANDOM: &str = "random
+.param r={agauss(1k,30,3)} same={r}
+.func own(a) {a*gauss(1,0.03,3)}
+.subckt part a
+R1 a 0 {aunif(500,100)}
+.ends
+V1 a 0 1
+Rr a 0 {r}
+Rs a 0 {same}
+Rf a 0 {own(1k)}
+Rg a 0 {own(1k)}
+Rl a 0 {limit(1k,100)}
+Ru a 0 {unif(1k,0.5)}
+X1 a part
+X2 a part
+.op
+.end
+";
+
+#[test]
+fn random_values_are_drawn_once_for_each_place_instance_step_and_seed() {
+    let (ngspice, xyce) = (netlist(RANDOM, "ngspice"), netlist(RANDOM, "xyce"));
+    let of = |name: &str, step, seed: &str| drawn(&ngspice, step, seed, name);
+    // A parameter is drawn once; calls of a function, instances, steps and seeds each for themselves.
+    assert_eq!(of("rr", 0, "1"), of("rs", 0, "1"));
+    assert_eq!(of("rr", 0, "1"), of("rr", 0, "1"));
+    for (a, b) in [
+        (of("rf", 0, "1"), of("rg", 0, "1")),
+        (of("x1.r1", 0, "1"), of("x2.r1", 0, "1")),
+        (of("rr", 0, "1"), of("rr", 1, "1")),
+        (of("rr", 0, "1"), of("rr", 0, "2")),
+    ] {
+        assert!(a != b && a.is_finite() && b.is_finite(), "{a} {b}");
+    }
+    // Xyce draws in analyses of samples only.
+    for (name, nominal) in [("rr", 1e3), ("rf", 1e3), ("x1.r1", 500.0), ("rl", 1e3), ("ru", 1e3)] {
+        assert_eq!(drawn(&xyce, 3, "1", name), nominal, "{name}");
+    }
+}
+
+#[test]
+fn random_values_have_the_distributions_of_their_functions() {
+    const N: u64 = 400;
+    // Four standard errors of mean and of variance.
+    let moments = |netlist: &Netlist, name: &str, mean: f64, deviation: f64, fourth: f64| {
+        let values: Vec<f64> = (0..N).map(|k| drawn(netlist, k, "7", name)).collect();
+        let unit: Vec<f64> = values.iter().map(|x| (x - mean) / deviation).collect();
+        let of = |f: &dyn Fn(f64) -> f64| unit.iter().map(|x| f(*x)).sum::<f64>() / N as f64;
+        let room = 4.0 / (N as f64).sqrt();
+        assert!(of(&|x| x).abs() < room, "{name}");
+        assert!((of(&|x| x * x) - 1.0).abs() < room * (fourth - 1.0).sqrt() + 1e-12, "{name}");
+        values
+    };
+    let ngspice = netlist(RANDOM, "ngspice");
+    moments(&ngspice, "rr", 1e3, 10.0, 3.0);
+    moments(&ngspice, "rf", 1e3, 10.0, 3.0);
+    let uniform = moments(&ngspice, "x1.r1", 500.0, 100.0 / 3f64.sqrt(), 1.8);
+    assert!(uniform.iter().all(|x| (400.0..600.0).contains(x)));
+    moments(&ngspice, "ru", 1e3, 500.0 / 3f64.sqrt(), 1.8);
+    let signs = moments(&ngspice, "rl", 1e3, 100.0, 1.0);
+    assert!(signs.iter().all(|x| [900.0, 1100.0].contains(x)));
+    let text = "ltspice\nV1 a 0 1\nRm a 0 {mc(1k,0.1)}\nRg a 0 {1k+gauss(20)}\nRf a 0 {1k+flat(50)}\n.op\n.end\n";
+    let ltspice = netlist(text, "ltspice");
+    moments(&ltspice, "rm", 1e3, 100.0 / 3f64.sqrt(), 1.8);
+    moments(&ltspice, "rg", 1e3, 20.0, 3.0);
+    moments(&ltspice, "rf", 1e3, 50.0 / 3f64.sqrt(), 1.8);
 }

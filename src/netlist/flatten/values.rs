@@ -341,7 +341,7 @@ impl Flat<'_> {
         let own = self.netlist.names.text(pending.device.name);
         let path = &self.scopes.get(pending.scope).path;
         match pending.pair {
-            (0, 0 | 1) => format!("{path}{own}"),
+            (0, 0 | 1) => [path, own].concat(),
             // Further pairs of one K.
             (first, second) => format!("{path}{own}#{}_{}", first + 1, second + 1),
         }

@@ -28,6 +28,10 @@ pub struct Variation {
     pub(super) temperature: Option<f64>,
     /// The name of the analysis that is run; without one the last.
     pub analysis: Option<String>,
+    /// Options besides those of the netlist, which win.
+    pub options: Vec<(String, String)>,
+    /// The step of `.step`, from 0 on: each draws its own random values.
+    pub step: u64,
 }
 
 /// The names of the temperature.

@@ -4,7 +4,7 @@ use super::cursor::node_name;
 use super::functions::Calls;
 use super::linked;
 use super::number;
-use super::{analyses, calls};
+use super::{analyses, calls, random};
 use crate::diagnostic::Diagnostic;
 use crate::expr::parse::{self, Language, Role};
 use crate::expr::{self, Node, Table};
@@ -64,7 +64,8 @@ pub fn with_calls(
             return None;
         }
     };
-    let mut language = Spice { names, spelling: dialect.spelling, reading, calls, file, offset };
+    let (spelling, dialect) = (dialect.spelling, dialect.name);
+    let mut language = Spice { names, spelling, dialect, reading, calls, file, offset };
     parse::expression(&mut language, pairs.next()?, d)
 }
 
@@ -212,6 +213,7 @@ fn colons_here(bytes: &[u8]) -> usize {
 struct Spice<'a> {
     names: &'a mut Names,
     spelling: expr::Dialect,
+    dialect: &'static str,
     reading: Reading,
     calls: Option<&'a mut Calls>,
     file: FileId,
@@ -296,13 +298,18 @@ impl Language for Spice<'_> {
         Some(Expr::new(node, span))
     }
 
-    /// In outputs, parts of phasors: `vm(a)`, `re(v(a))`.
+    /// Random values; in outputs, parts of phasors: `vm(a)`, `re(v(a))`.
     fn own_call(
         &mut self,
         name: &str,
         pair: &Pair<'_, Rule>,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Option<Expr>> {
+        let parts = pair.clone().into_inner();
+        let given = parts.filter(|part| Self::role(part.as_rule()) == Role::Expression);
+        if self.calls.is_some() && random::is_one(name, self.dialect, given.clone().count()) {
+            return Some(self.random(name, given, self.span(pair.as_span()), d));
+        }
         if !self.reading.parts {
             return None;
         }
@@ -373,6 +380,23 @@ impl Language for Spice<'_> {
                 None
             }
         }
+    }
+}
+
+impl Spice<'_> {
+    fn random<'i>(
+        &mut self,
+        name: &str,
+        parts: impl Iterator<Item = Pair<'i, Rule>>,
+        span: Span,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Expr> {
+        let mut arguments = vec![];
+        for part in parts {
+            arguments.push(parse::expression(self, part, d)?);
+        }
+        let number = self.calls.as_mut()?.draw();
+        random::apply(name, self.dialect, &arguments, number, span, d)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::expr::parse::{MAX_DEPTH, too_deep, unknown_function};
 use crate::expr::slope::slope;
 use crate::netlist::parts::{every_leaf, map_leaves};
 use crate::netlist::visit::expressions_mut;
-use crate::netlist::{Card, CardKind, Definition, Expr, Leaf, Name, Names, Netlist};
+use crate::netlist::{Card, CardKind, Definition, Expr, Leaf, Name, Names, Netlist, Operator};
 use crate::quantity::nearest;
 use crate::source::Span;
 use std::collections::HashMap;
@@ -26,6 +26,8 @@ const DEEPEST: usize = 100;
 pub struct Calls {
     calls: HashMap<Name, Call>,
     order: Vec<Name>,
+    /// How many places draw a random number.
+    draws: u32,
 }
 
 /// A call of a function that the table of functions does not know.
@@ -49,6 +51,12 @@ impl Calls {
         self.calls.insert(own, Call { function, arguments, span });
         self.order.push(own);
         Leaf::Parameter(own)
+    }
+
+    /// The number of a new place that draws a random number.
+    pub fn draw(&mut self) -> u32 {
+        self.draws += 1;
+        self.draws
     }
 
     /// How many there are.
@@ -91,6 +99,7 @@ pub fn resolve(reader: &mut Reader, netlist: &mut Netlist) {
         scopes: vec![],
         chain: vec![],
         left: MOST_NODES,
+        draws: reader.calls.draws,
         d: reader.diagnostics,
     };
     if !calls.is_empty() || reader.defined {
@@ -106,6 +115,8 @@ struct Resolver<'a> {
     /// The functions whose bodies are being put in.
     chain: Vec<Name>,
     left: usize,
+    /// How many places draw a random number.
+    draws: u32,
     d: &'a mut Vec<Diagnostic>,
 }
 
@@ -193,9 +204,21 @@ impl Resolver<'_> {
         self.chain.push(call.function);
         let body = self.expr(&function.body);
         self.chain.pop();
+        let mut renumbered: Vec<(u32, u32)> = vec![];
         let body = map_leaves(&body, &mut |leaf, span| {
             let argument = match leaf {
                 Leaf::Parameter(name) => function.arguments.iter().position(|own| own == name),
+                // Each call draws for itself.
+                Leaf::Operator(Operator::Draw(draw, number), _) => {
+                    let known = renumbered.iter().find(|(old, _)| old == number);
+                    let new = known.map_or(self.draws + 1, |(_, new)| *new);
+                    if known.is_none() {
+                        self.draws = new;
+                        renumbered.push((*number, new));
+                    }
+                    let leaf = Leaf::Operator(Operator::Draw(*draw, new), vec![]);
+                    return Expr::new(crate::expr::Node::Leaf(leaf), span);
+                }
                 _ => None,
             };
             match argument.and_then(|k| arguments.get(k)) {

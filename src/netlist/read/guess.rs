@@ -53,7 +53,8 @@ pub fn guess(file: FileId, text: &str) -> Guess {
     }
     let (mut at, mut xyce_package) = (0, None);
     while at < text.len() {
-        let end = text[at..].find('\n').map_or(text.len(), |length| at + length);
+        let end =
+            memchr::memchr(b'\n', &text.as_bytes()[at..]).map_or(text.len(), |length| at + length);
         let line = text[at..end].trim_start();
         let start = end - line.len();
         // What stands behind a mark is comment.

@@ -174,7 +174,8 @@ fn wanted(map: &SourceMap, file: FileId, includes: &mut Includes) -> Vec<Wanted>
     let mut found = vec![];
     let mut at = 0;
     while at < text.len() {
-        let end = text[at..].find('\n').map_or(text.len(), |length| at + length);
+        let end =
+            memchr::memchr(b'\n', &text.as_bytes()[at..]).map_or(text.len(), |length| at + length);
         let line = text[at..end].trim_start();
         let start = end - line.len();
         at = end + 1;

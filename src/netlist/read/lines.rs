@@ -38,7 +38,7 @@ impl<'a> Lines<'a> {
         if at >= self.text.len() {
             return None;
         }
-        let end = self.text.as_bytes()[at..].iter().position(|b| *b == b'\n');
+        let end = memchr::memchr(b'\n', &self.text.as_bytes()[at..]);
         Some((at, end.map_or(self.text.len(), |length| at + length)))
     }
 }
@@ -131,7 +131,7 @@ impl<'a> Lines<'a> {
 fn split_comment(line: &str, marks: &[&str]) -> (usize, Option<String>) {
     let bytes = line.as_bytes();
     // Most lines hold none of the marks.
-    if !bytes.iter().any(|b| matches!(b, b';' | b'$' | b'/')) {
+    if memchr::memchr3(b';', b'$', b'/', bytes).is_none() {
         return (line.len(), None);
     }
     let mut quoted = false;

@@ -12,6 +12,7 @@ pub mod blocks;
 pub mod fourier;
 mod functions;
 pub mod options;
+mod random;
 pub mod number;
 pub mod cursor;
 pub mod expression;

@@ -1,4 +1,4 @@
-//! The random numbers of `noise(seed, rms, dt)`: the same on every machine, each by its index alone.
+//! The random numbers of `noise(seed, rms, dt)` and of netlists: the same on every machine, each by its index alone.
 //!
 //! The k-th number is rms·√(−2·ln u)·cos(2π·v): normal, of mean 0 and root mean square rms (G. E. P. Box, M. E. Muller,
 //! Ann. Math. Stat. 29:610, 1958). u and v are the (2k)-th and (2k+1)-th outputs of SplitMix64 from the state that its
@@ -7,18 +7,28 @@
 
 use std::f64::consts::TAU;
 
-/// The k-th number of a seed, of root mean square 1. It holds for k·dt ≤ t < (k + 1)·dt.
+/// The k-th normal number of a seed, of mean 0 and root mean square 1. In noise it holds for k·dt ≤ t < (k + 1)·dt.
 pub fn normal(seed: u64, k: u64) -> f64 {
-    let start = mix(seed.wrapping_add(GAMMA));
-    let fraction = |n: u64| {
-        let state = start.wrapping_add(n.wrapping_add(1).wrapping_mul(GAMMA));
-        (mix(state) >> 11) as f64
-    };
-    let scale = (1u64 << 53) as f64;
-    let u = (fraction(2 * k) + 1.0) / scale;
-    let v = fraction(2 * k + 1) / scale;
+    let u = fraction(seed, 2 * k) + 1.0 / SCALE;
+    let v = fraction(seed, 2 * k + 1);
     (-2.0 * libm::log(u)).sqrt() * libm::cos(TAU * v)
 }
+
+/// The k-th number of a seed in [0, 1), all equally likely.
+pub fn fraction(seed: u64, k: u64) -> f64 {
+    let state = mix(seed.wrapping_add(GAMMA)).wrapping_add(k.wrapping_add(1).wrapping_mul(GAMMA));
+    (mix(state) >> 11) as f64 / SCALE
+}
+
+/// The seed of what belongs to a seed and to a text: other texts have others.
+pub fn below(seed: u64, text: &str) -> u64 {
+    text.bytes().fold(mix(seed.wrapping_add(GAMMA)), |state, byte| {
+        mix((state ^ u64::from(byte)).wrapping_add(GAMMA))
+    })
+}
+
+/// Fractions are multiples of its inverse.
+const SCALE: f64 = (1u64 << 53) as f64;
 
 /// The odd step of the state: 2⁶⁴ over the golden ratio.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
