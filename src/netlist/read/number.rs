@@ -96,8 +96,40 @@ pub fn number(text: &str, numbers: Numbers) -> Option<Number> {
     Some(Number { value, letters, end })
 }
 
+/// Powers of ten that doubles hold exactly.
+#[rustfmt::skip]
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21,
+    1e22,
+];
+
+/// mantissa·10^power of at most 15 digits, where that is one exact number times or over another, so that there is one
+/// rounding (W. D. Clinger, PLDI 1990).
+fn short(mantissa: &str, power: i64) -> Option<f64> {
+    let (mut digits, mut behind, mut point) = (0u64, 0, false);
+    if mantissa.len() > 15 {
+        return None;
+    }
+    for byte in mantissa.bytes() {
+        match byte {
+            b'0'..=b'9' => {
+                digits = digits * 10 + u64::from(byte - b'0');
+                behind += i64::from(point);
+            }
+            b'.' => point = true,
+            _ => return None,
+        }
+    }
+    let power = power.checked_sub(behind)?;
+    let factor = *POWERS.get(usize::try_from(power.unsigned_abs()).ok()?)?;
+    Some(if power < 0 { digits as f64 / factor } else { digits as f64 * factor })
+}
+
 fn scaled(mantissa: &str, power: i64) -> Option<f64> {
     use std::io::Write;
+    if let Some(value) = short(mantissa, power) {
+        return Some(value);
+    }
     let mut buffer = [0u8; 48];
     let mut left = &mut buffer[..];
     if write!(left, "{mantissa}e{power}").is_ok() {
@@ -110,6 +142,31 @@ fn scaled(mantissa: &str, power: i64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn short_numbers_are_rounded_once() {
+        // Against the standard library's parser, which rounds to nearest.
+        let mut seed = 1u64;
+        let mut next = |below: u64| {
+            seed = seed.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            (seed >> 33) % below
+        };
+        let mut exact = 0;
+        for _ in 0..20_000 {
+            let whole: String =
+                (0..1 + next(9)).map(|_| char::from(b'0' + next(10) as u8)).collect();
+            let behind: String = (0..next(7)).map(|_| char::from(b'0' + next(10) as u8)).collect();
+            let mantissa = if behind.is_empty() { whole } else { format!("{whole}.{behind}") };
+            let power = next(61) as i64 - 30;
+            let wanted: f64 = format!("{mantissa}e{power}").parse().unwrap();
+            if let Some(value) = short(&mantissa, power) {
+                exact += 1;
+                assert_eq!(value.to_bits(), wanted.to_bits(), "{mantissa}e{power}");
+            }
+            assert_eq!(scaled(&mantissa, power), Some(wanted));
+        }
+        assert!(exact > 10_000, "{exact}");
+    }
 
     const NGSPICE: Numbers = Numbers { atto: true, x_is_mega: false, digits_behind: false };
     const XYCE: Numbers = Numbers { atto: false, x_is_mega: true, digits_behind: false };
