@@ -342,3 +342,72 @@ fn what_makes_no_sense_is_said() {
         assert!(errors(&format!("v1 a 0 1\nr1 a 0 1k\n{card}")).contains(&code), "{card}");
     }
 }
+
+#[test]
+fn phases_are_in_degrees_or_radians_as_the_deck_says() {
+    let deck = "v1 in 0 0 ac 1\nr1 in out 1k\nc1 out 0 1u\n.ac list 159.15494309189535\n.print ac vp(out)\n";
+    let phase = |text: &str, dialect: &str| {
+        let (mut map, overrides) = (SourceMap::default(), Overrides::default());
+        let text = format!("*bondspice dialect={dialect}\n{deck}{text}");
+        let file = map.add("deck.cir", format!("t\n{text}.end\n"));
+        let mut d = vec![];
+        let run = prepare(&mut map, file, &overrides, None, &mut d).unwrap();
+        let mut trace = run.trace();
+        run.go(&mut trace).unwrap();
+        column(&trace, "vp(out)")[0]
+    };
+    let quarter = std::f64::consts::FRAC_PI_4;
+    for (text, dialect, expected) in [
+        ("", "xyce", -quarter),
+        (".options output phase_output_radians=false\n", "xyce", -45.0),
+        (".options output phase_output_radians=1\n", "xyce", -quarter),
+        ("", "ltspice", -45.0),
+    ] {
+        let phase = phase(text, dialect);
+        assert!((phase - expected).abs() < 1e-9, "{text} {phase}");
+    }
+}
+
+#[test]
+fn several_instances_equal_as_many_written_out() {
+    // Every kind of device within, with currents that others read, terminals that lead on, and instances within.
+    let part = ".subckt inner p q
+r1 p q 3k
+c1 q 0 0.3u ic=0.2
+.ends
+.subckt part a b
+v1 a c 0.1
+r1 c d 100
+l1 d e 1m
+l2 f 0 4m
+k1 l1 l2 0.6
+r2 f 0 50
+d1 e b dm
+c1 e 0 1u
+f1 0 g v1 2
+r3 g 0 1k
+h1 h 0 v1 100
+b1 b 0 i=0.1m*v(h)*v(h)+0.01*i(l1)
+r4 h 0 1k
+x1 e b inner m=2
+.ends
+.model dm d(is=1e-12)
+v1 in 0 sin(0 3 1k)
+rb out 0 500
+";
+    let written = "x1 in out part\nx2 in out part\nx3 in out part\n";
+    let last = ".options reltol=1e-7\n.tran 20u 1m uic\n.print tran i(v1) v(out) v(x1.e) v(x1.g) i(x1.l1) v(x1.x1.q)\n";
+    let one = run(&format!("{part}{written}{last}"));
+    let several = run(&format!("{part}x1 in out part m=3\n{last}"));
+    let found = bondspice::trace::compare::compare(&several, &one, &Default::default());
+    assert!(found.missing.is_empty() && found.signals.len() == 6, "{found:?}");
+    // Each run takes steps of its own, whose errors of 1e-7 add up.
+    for signal in &found.signals {
+        assert!(signal.max < 4e-6 * signal.range, "{signal:?}");
+    }
+    // Not a whole number of instances: a conductance.
+    let trace = run(
+        ".subckt part a\nr1 a 0 1k\n.ends\nv1 a 0 1\nx1 a part m={k/2}\n.param k=3\n.op\n.print op i(v1)\n",
+    );
+    assert!((column(&trace, "i(v1)")[0] + 1.5e-3).abs() < 1e-15);
+}

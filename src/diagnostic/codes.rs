@@ -196,6 +196,7 @@ pub const CODES: &[Code] = &[
     row("E0772", "pattern makes no sense", "PAT(vhi vlo td tr tf tsample b0101) takes six numbers and its bits, and behind it R=n for n repetitions, R=-1 for ever."),
     row("E0773", "arguments of a call", "The call takes another number of arguments, or points of a curve that are not numbers with rising abscissae."),
     row("E0774", "file of numbers", "A file that a curve or a PWL is read from holds pairs of a time and a value, the times rising: one pair a line, a blank or a comma between them."),
+    row("E0775", "several instances make no sense", "`m=` of an X card says how many equal instances stand in parallel: a number above 0. What they take up at a node of `.global` cannot be told."),
     row("E0780", "floating node", "Nothing determines the voltage of a node, or of a group of nodes: only current sources, or nothing at all, join it to the rest of the circuit. Join it to ground by a resistor, or name one of the nodes 0."),
     row("E0781", "loop of voltage sources", "Voltage sources form a loop, so that any current could flow round it; two of them in parallel are such a loop. Put a resistance into the loop, or take one source out."),
     row("E0782", "values make no sweep", "The increment leads from the first value to the last; decades and octaves go between values of one sign; there is at least one value; frequencies are not below 0."),

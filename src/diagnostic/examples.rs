@@ -166,6 +166,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E0772" "pattern_without_bits.cir"
     "E0773" "integral_arguments.cir"
     "E0774" "file_of_words.cir"
+    "E0775" "copies.cir"
     "E0780" "floating_together.cir"
     "E0781" "voltage_loop.cir"
     "E0782" "frequency_below_0.cir"

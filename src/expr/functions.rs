@@ -339,7 +339,7 @@ pub fn nearest(name: &str) -> Option<&'static str> {
         .map(|row| row.name)
 }
 
-fn edit_distance(left: &str, right: &str) -> usize {
+pub(super) fn edit_distance(left: &str, right: &str) -> usize {
     let right: Vec<char> = right.chars().collect();
     let mut row: Vec<usize> = (0..=right.len()).collect();
     for (i, l) in left.chars().enumerate() {

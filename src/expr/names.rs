@@ -14,7 +14,7 @@
 //! | `nint(±0.5)` | to the even number | away from 0 | (`round`) away from 0 |
 //! | `atanh` beyond ±1 | NaN | held within ±(1 − 1e-12) | NaN |
 
-use super::functions::{Dialect, FUNCTIONS, Function, Slot, Template};
+use super::functions::{self, Dialect, FUNCTIONS, Function, Slot, Template};
 use super::tree::{Binary, Expr};
 
 /// What a name of a dialect's text means.
@@ -181,8 +181,29 @@ const NAMES: &[Row] = &[
     row!("rand", None, tree(0, || n(0.5)), None),
 ];
 
-/// Names of the table of functions that netlists do not use, or use otherwise.
-const BOND_ONLY: &[&str] = &["sign", "clamp", "abspow", "signpow", "realpow"];
+/// Names of the table of functions that netlists do not use, or use otherwise; and what they call it.
+const BOND_ONLY: &[(&str, &str)] = &[
+    ("sign", "sgn"),
+    ("clamp", "limit"),
+    ("abspow", "pow"),
+    ("signpow", "pwrs"),
+    ("realpow", "pow"),
+];
+
+/// The name in a dialect that is nearest to one that it does not know, for a hint.
+pub fn nearest(dialect: Dialect, name: &str) -> Option<&'static str> {
+    let folded = name.to_lowercase();
+    if dialect == Dialect::Bond {
+        return functions::nearest(name);
+    }
+    let other = BOND_ONLY.iter().find(|(own, _)| *own == folded).map(|(_, other)| *other);
+    let own = FUNCTIONS.iter().map(|row| row.name).chain(NAMES.iter().map(|row| row.name));
+    let own = own.filter(|own| find(dialect, own).is_some());
+    other.filter(|other| find(dialect, other).is_some()).or_else(|| {
+        let near = own.map(|own| (functions::edit_distance(&folded, own), own));
+        near.filter(|(distance, _)| *distance <= 1 + name.len() / 4).min().map(|(_, own)| own)
+    })
+}
 
 /// What a name means in a dialect. Netlists fold case; `.bg` files do not.
 pub fn find(dialect: Dialect, name: &str) -> Option<Meaning> {
@@ -198,7 +219,7 @@ pub fn find(dialect: Dialect, name: &str) -> Option<Meaning> {
     let folded = name.to_lowercase();
     match NAMES.iter().find(|row| row.name == folded) {
         Some(row) => row.means[column],
-        None if BOND_ONLY.contains(&folded.as_str()) => None,
+        None if BOND_ONLY.iter().any(|(own, _)| *own == folded) => None,
         None => in_table(&folded),
     }
 }

@@ -27,7 +27,7 @@
 //! So no later stage that walks a tree can overflow its stack.
 
 use super::chains::{Operator, Part, Stack, join, measured};
-use super::functions::{self, Dialect, Function, Slot, Template};
+use super::functions::{Dialect, Function, Slot, Template};
 use super::names::{self, Meaning};
 use super::tree::{Binary, Expr, Node};
 use crate::diagnostic::Diagnostic;
@@ -182,9 +182,9 @@ pub fn too_deep(span: Span) -> Diagnostic {
 }
 
 /// The error for a call of a function that nobody knows.
-pub fn unknown_function(name: &str, span: Span) -> Diagnostic {
+pub fn unknown_function(dialect: Dialect, name: &str, span: Span) -> Diagnostic {
     let error = Diagnostic::error("E0210", span, format!("unknown function `{name}`"));
-    match functions::nearest(name) {
+    match names::nearest(dialect, name) {
         Some(nearest) => error.help(format!("did you mean `{nearest}`?")),
         None => error,
     }

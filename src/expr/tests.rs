@@ -98,7 +98,7 @@ macro_rules! toy {
             ) -> Option<Expr<String>> {
                 let span = self.span(pair.as_span());
                 if name != "form" {
-                    d.push(parse::unknown_function(name, span));
+                    d.push(parse::unknown_function(Dialect::Bond, name, span));
                     return None;
                 }
                 let rules = pair.into_inner().map(|p| format!("{:?}", p.as_rule()));

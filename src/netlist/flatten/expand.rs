@@ -47,6 +47,8 @@ pub struct Flat<'n> {
     pub nominal_temperature: f64,
     /// The time constant in s that voltages follow their laws with.
     pub following: Option<f64>,
+    /// Terminals of instances that stand for several.
+    pub joints: Vec<Joint<'n>>,
     /// What laws speak of and is no device of a card; numbered after those.
     pub quantities: RefCell<Vec<circuit::Device>>,
 }
@@ -90,6 +92,7 @@ pub fn expand_with<'n>(
         temperature: ROOM,
         nominal_temperature: ROOM,
         following: None,
+        joints: vec![],
         quantities: RefCell::default(),
     };
     flat.scopes.all.push(Scope::default());
@@ -98,7 +101,7 @@ pub fn expand_with<'n>(
     let seed = stated("seed").filter(|seed| *seed >= 0.0).unwrap_or(1.0);
     flat.scopes.seed = random::below(seed as u64, &format!("step {}", variation.step));
     let ground = netlist.names.find("0");
-    let mut expander = Expander { flat, variation, ground, chain: vec![], full: false };
+    let mut expander = Expander { flat, variation, ground, chain: vec![], several: 0, full: false };
     globals(&mut expander.flat.scopes.globals, &netlist.cards);
     let varied: Vec<(Name, &Expr)> =
         variation.parameters.iter().map(|(name, expr)| (*name, expr)).collect();
@@ -143,6 +146,8 @@ struct Expander<'n> {
     ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
+    /// How many of them stand for several in parallel.
+    several: usize,
     full: bool,
 }
 
@@ -335,6 +340,9 @@ impl<'n> Expander<'n> {
         let nodes: Vec<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;
+        if self.several > 0 {
+            self.refuse_globals(id, card, device, d);
+        }
         let number = DeviceId(self.flat.devices.len() as u32);
         if let Some(before) = self.flat.scopes.get_mut(id).devices.insert(device.name, number) {
             let first = self
@@ -431,13 +439,29 @@ impl<'n> Expander<'n> {
             }
             return;
         }
+        let several = self.copies(id, card, subcircuit, parameters, d);
         let mut table: Table<NodeId> = Table::default();
         for (port, node) in subcircuit.ports.iter().zip(nodes) {
-            table.insert(*port, *node);
+            let inner = match several {
+                Some(copies) if node.0 != 0 => {
+                    let own = [self.flat.scopes.get(id).path.as_str(), names.text(device.name)];
+                    let name = format!("{}#{}", own.concat(), names.text(*port));
+                    let inner = NodeId(self.flat.nodes.len() as u32);
+                    let node_name = name.clone();
+                    self.flat.nodes.push(Node { name: node_name, nominal: None, span: card.span });
+                    self.flat.joints.push(Joint { name, nodes: [*node, inner], copies, card });
+                    inner
+                }
+                _ => *node,
+            };
+            table.insert(*port, inner);
         }
         let (mut values, mut varying): (Vec<(Name, Expr)>, Vec<Name>) = (vec![], vec![]);
         for (name, expr) in parameters {
             if !subcircuit.parameters.iter().any(|(own, _)| own == name) {
+                if names.text(*name).eq_ignore_ascii_case(COPIES) {
+                    continue;
+                }
                 let text = names.text(*name);
                 let error = Diagnostic::error(
                     "E0733",
@@ -491,8 +515,94 @@ impl<'n> Expander<'n> {
         let names = &self.flat.netlist.names;
         scope::parameters(&mut self.flat.scopes, inner, &given, names, d);
         self.chain.push(subcircuit);
+        self.several += usize::from(several.is_some());
         self.body(inner, &live, d);
+        self.several -= usize::from(several.is_some());
         self.chain.pop();
+    }
+
+    /// What an instance that stands for several takes up at a global node is not known from its terminals.
+    fn refuse_globals(&self, id: ScopeId, card: &Card, device: &Device, d: &mut Vec<Diagnostic>) {
+        let scope = self.flat.scopes.get(id);
+        let inside = |name: &Name| scope.nodes.get(name).is_some_and(|node| node.0 != 0);
+        let global = |name: &&Name| {
+            self.flat.scopes.globals.contains_key(name)
+                && Some(**name) != self.ground
+                && !inside(name)
+        };
+        let Some(name) = device.nodes.iter().find(global) else { return };
+        let text = self.flat.netlist.names.text(*name);
+        let message = format!("`{text}` is global, and several instances stand here (`m=`)");
+        let error = Diagnostic::error("E0775", card.span, message)
+            .because("what they take up there cannot be told")
+            .help(format!("make `{text}` a terminal of the subcircuit"));
+        if d.len() < 1000 && !d.contains(&error) {
+            d.push(error);
+        }
+    }
+
+    /// How many copies of a subcircuit an instance is, where `m=` says another number than 1 and is no parameter of it.
+    fn copies(
+        &self,
+        id: ScopeId,
+        card: &Card,
+        subcircuit: &Subcircuit,
+        parameters: &[(Name, Expr)],
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<f64> {
+        let names = &self.flat.netlist.names;
+        let own = |name: &Name| names.text(*name).eq_ignore_ascii_case(COPIES);
+        let (name, expr) = parameters.iter().find(|(name, _)| own(name))?;
+        if subcircuit.parameters.iter().any(|(own, _)| own == name) {
+            return None;
+        }
+        let copies = scope::number(&self.flat.scopes, id, expr, names, d)?;
+        if !(copies > 0.0 && copies.is_finite()) {
+            let message = format!("`m={copies}` is no number of instances");
+            d.push(Diagnostic::error("E0775", card.span, message).help("it is above 0"));
+            return None;
+        }
+        (copies != 1.0).then_some(copies)
+    }
+}
+
+/// The key of an X card that says how many instances stand in parallel.
+const COPIES: &str = "m";
+
+/// A terminal of an instance that stands for several in parallel: what it takes up is taken up as often.
+pub struct Joint<'n> {
+    /// The instance and its terminal.
+    pub name: String,
+    /// Outside, and within the one instance that is there.
+    pub nodes: [NodeId; 2],
+    /// How many there are.
+    pub copies: f64,
+    /// The instance.
+    pub card: &'n Card,
+}
+
+impl Flat<'_> {
+    /// Makes devices of the joints: a source of 0 V senses the current of one instance, and what the others take up flows
+    /// to the ground, where all that enters an instance leaves it in the end.
+    pub fn join(&self) {
+        for joint in &self.joints {
+            let mut made = self.quantities.borrow_mut();
+            let sense = DeviceId((self.devices.len() + made.len()) as u32);
+            let [outer, inner] = joint.nodes;
+            let constant = circuit::Waveform::Constant(0.0);
+            let device = |name: String, nodes, kind| circuit::Device {
+                name,
+                nodes,
+                kind,
+                nominal: None,
+                span: joint.card.span,
+            };
+            let parts = circuit::Parts::default();
+            let kind = circuit::DeviceKind::VoltageSource { waveform: constant, parts };
+            made.push(device(joint.name.clone(), vec![outer, inner], kind));
+            let kind = circuit::DeviceKind::Cccs { gain: joint.copies - 1.0, control: sense };
+            made.push(device(format!("{}#others", joint.name), vec![outer, NodeId(0)], kind));
+        }
     }
 }
 

@@ -62,6 +62,7 @@ pub fn flatten_with(
         flat.temperature = temperature;
     }
     flat.following = experiment::smoothing(&options, diagnostics);
+    flat.join();
     let mut devices = kinds::resolve(&flat, &header, times, diagnostics);
     let guesses = experiment::guesses(&flat, diagnostics);
     let starts = guess::follow(&devices, flat.nodes.len(), &guesses);

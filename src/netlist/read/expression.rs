@@ -339,7 +339,7 @@ impl Language for Spice<'_> {
         let folded = name.to_ascii_lowercase();
         let row = calls::find(&folded);
         if row.is_none() && folded != "table" && folded != "pwl" && self.calls.is_none() {
-            d.push(parse::unknown_function(name, span));
+            d.push(parse::unknown_function(self.spelling, name, span));
             return None;
         }
         let mut arguments = vec![];

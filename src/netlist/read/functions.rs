@@ -96,6 +96,7 @@ pub fn resolve(reader: &mut Reader, netlist: &mut Netlist) {
     let mut resolver = Resolver {
         calls: &calls,
         names: &reader.names,
+        dialect: reader.dialect.spelling,
         scopes: vec![],
         chain: vec![],
         left: MOST_NODES,
@@ -110,6 +111,7 @@ pub fn resolve(reader: &mut Reader, netlist: &mut Netlist) {
 struct Resolver<'a> {
     calls: &'a HashMap<Name, Call>,
     names: &'a Names,
+    dialect: crate::expr::Dialect,
     /// The functions of each block, the innermost last.
     scopes: Vec<HashMap<Name, Definition>>,
     /// The functions whose bodies are being put in.
@@ -248,7 +250,7 @@ impl Resolver<'_> {
         match nearest(text, known) {
             Some(near) => Diagnostic::error("E0210", span, format!("unknown function `{text}`"))
                 .help(format!("did you mean `{near}`?")),
-            None => unknown_function(text, span),
+            None => unknown_function(self.dialect, text, span),
         }
     }
 }

@@ -25,6 +25,8 @@ pub struct Includes {
     files: HashMap<(FileId, usize), FileId>,
     /// `.preprocess replaceground true`: other names of the ground count, too.
     pub replace_ground: bool,
+    /// Whether phases are in degrees, where `.options output phase_output_radians=` says it.
+    pub degrees: Option<bool>,
 }
 
 impl Includes {
@@ -187,6 +189,15 @@ fn wanted(map: &SourceMap, file: FileId, includes: &mut Includes) -> Vec<Wanted>
         if is(".preprocess") {
             let folded = rest.to_ascii_lowercase();
             includes.replace_ground |= folded.contains("replaceground") && folded.contains("true");
+        }
+        if is(".options") || is(".option") {
+            // It changes what words of other cards mean, before and behind it.
+            let folded = rest.to_ascii_lowercase();
+            let said = folded.split_once("phase_output_radians").map(|(_, value)| value);
+            let value = said.map(|value| value.trim_start_matches([' ', '\t', '=']));
+            if let Some(value) = value {
+                includes.degrees = Some(value.starts_with(['0', 'f']));
+            }
         }
         if is(".end") {
             break;

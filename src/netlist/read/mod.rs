@@ -107,6 +107,7 @@ pub fn read(
     if includes.replace_ground {
         reading.grounds = EVERY_GROUND;
     }
+    reading.degrees = includes.degrees.unwrap_or(reading.degrees);
     let mut reader = Reader {
         dialect,
         reading,

@@ -45,6 +45,8 @@ const KEYS: &[(&str, &str, &[&str])] = &[
     ("sensitivity", "direct", &["sensitivity_direct"]),
     ("sensitivity", "adjoint", &["sensitivity_adjoint"]),
     ("output", "initial_interval", &["initial_interval"]),
+    // Seen beforehand, when files are looked for.
+    ("output", "phase_output_radians", &[]),
 ];
 
 /// A looser tolerance of Xyce is passed over: there it is a part of each present value, here of the largest so far, and

@@ -2,7 +2,7 @@
 //!
 //! A call becomes nominal + spread·draw, where a draw is a number of its own for each place in the text, each instance of a
 //! subcircuit and each `.step` (see `flatten::scope::draw`). Xyce draws in its own analyses of samples only; elsewhere it
-//! takes the nominal value, and so do we.
+//! takes the nominal value, and so do we (`expr::names`, and `limit` here, which has another meaning besides).
 
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
@@ -23,17 +23,16 @@ struct Row {
     of: fn(&[Expr]) -> (Expr, Expr),
 }
 
-const HSPICE: &[&str] = &["ngspice", "xyce"];
+const NGSPICE: &[&str] = &["ngspice"];
 const LTSPICE: &[&str] = &["ltspice"];
 
 #[rustfmt::skip]
 const ROWS: &[Row] = &[
-    Row { name: "agauss", dialects: HSPICE, arguments: [2, 3], form: "agauss(nominal, variation, sigmas)", draw: Draw::Normal, of: |a| (a[0].clone(), over(a[1].clone(), a.get(2))) },
-    Row { name: "gauss", dialects: HSPICE, arguments: [2, 3], form: "gauss(nominal, relative variation, sigmas)", draw: Draw::Normal, of: |a| (a[0].clone(), over(times(&a[0], &a[1]), a.get(2))) },
-    Row { name: "aunif", dialects: HSPICE, arguments: [2, 2], form: "aunif(nominal, variation)", draw: Draw::Uniform, of: |a| (a[0].clone(), a[1].clone()) },
-    Row { name: "unif", dialects: HSPICE, arguments: [2, 2], form: "unif(nominal, relative variation)", draw: Draw::Uniform, of: |a| (a[0].clone(), times(&a[0], &a[1])) },
-    Row { name: "limit", dialects: HSPICE, arguments: [2, 2], form: "limit(nominal, variation)", draw: Draw::Sign, of: |a| (a[0].clone(), a[1].clone()) },
-    Row { name: "rand", dialects: &["xyce"], arguments: [0, 0], form: "rand()", draw: Draw::Uniform, of: |_| (Expr::number(0.5), Expr::number(0.5)) },
+    Row { name: "agauss", dialects: NGSPICE, arguments: [2, 3], form: "agauss(nominal, variation, sigmas)", draw: Draw::Normal, of: |a| (a[0].clone(), over(a[1].clone(), a.get(2))) },
+    Row { name: "gauss", dialects: NGSPICE, arguments: [2, 3], form: "gauss(nominal, relative variation, sigmas)", draw: Draw::Normal, of: |a| (a[0].clone(), over(times(&a[0], &a[1]), a.get(2))) },
+    Row { name: "aunif", dialects: NGSPICE, arguments: [2, 2], form: "aunif(nominal, variation)", draw: Draw::Uniform, of: |a| (a[0].clone(), a[1].clone()) },
+    Row { name: "unif", dialects: NGSPICE, arguments: [2, 2], form: "unif(nominal, relative variation)", draw: Draw::Uniform, of: |a| (a[0].clone(), times(&a[0], &a[1])) },
+    Row { name: "limit", dialects: &["ngspice", "xyce"], arguments: [2, 2], form: "limit(nominal, variation)", draw: Draw::Sign, of: |a| (a[0].clone(), a[1].clone()) },
     Row { name: "gauss", dialects: LTSPICE, arguments: [1, 1], form: "gauss(sigma)", draw: Draw::Normal, of: |a| (Expr::number(0.0), a[0].clone()) },
     Row { name: "flat", dialects: LTSPICE, arguments: [1, 1], form: "flat(variation)", draw: Draw::Uniform, of: |a| (Expr::number(0.0), a[0].clone()) },
     Row { name: "mc", dialects: LTSPICE, arguments: [2, 2], form: "mc(nominal, relative variation)", draw: Draw::Uniform, of: |a| (a[0].clone(), times(&a[0], &a[1])) },
