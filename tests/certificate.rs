@@ -6,7 +6,7 @@ use bondspice::cli::pipeline::{self, Model, Question};
 use bondspice::diagnostic::Diagnostic;
 use bondspice::netlist::dialects::DIALECTS;
 use bondspice::netlist::read::How;
-use bondspice::netlist::write;
+use bondspice::netlist::{Card, CardKind, write};
 use bondspice::quantity::Domain;
 use bondspice::source::SourceMap;
 use bondspice::verify::{self, Certificate, Values};
@@ -107,7 +107,7 @@ fn it_holds_in_every_dialect_that_is_read() {
         if dialect.text.is_none() || dialect.name == "ngspice" {
             continue;
         }
-        let (mut held, mut unsaid) = (0, 0);
+        let (mut held, mut unsaid, mut nested) = (0, 0, 0);
         for name in models() {
             let (mut map, model, _) = shipped(&name);
             let question = Question { to: Some(dialect), ..Question::default() };
@@ -118,6 +118,11 @@ fn it_holds_in_every_dialect_that_is_read() {
                     let first = found.first().map(|first| first.line());
                     assert!(found.holds(), "{name} in {}: {first:?}", dialect.name);
                     held += 1;
+                    let block = |card: &Card| matches!(card.kind, CardKind::Subcircuit(_));
+                    let instances = model.graph.tree.len() > 1;
+                    let subcircuits = netlist.cards.iter().any(block);
+                    assert_eq!(subcircuits, instances && dialect.nested, "{name}");
+                    nested += usize::from(subcircuits);
                 }
                 // What the dialect has no word for is an error that names the element.
                 None => {
@@ -128,6 +133,7 @@ fn it_holds_in_every_dialect_that_is_read() {
         }
         let least = if dialect.name == "gnucap" { 8 } else { 20 };
         assert!(held >= least, "{}: {held} held, {unsaid} unsaid", dialect.name);
+        assert!(nested >= 12 || !dialect.nested, "{}: {nested} with subcircuits", dialect.name);
     }
 }
 
@@ -174,20 +180,25 @@ fn scaling(plain: &Model, scaled: &Model, asked: &[(Domain, f64)]) -> Values {
 
 #[test]
 fn scaled_models_are_the_unscaled_ones_and_so_are_their_netlists() {
-    let mut count = 0;
+    let (mut count, mut nested) = (0, 0);
     for name in models() {
         for scales in ["auto", SCALES] {
             let (mut map, [plain, scaled], asked) = both(&name, scales);
             let found = scaling(&plain, &scaled, &asked);
             assert_eq!(found.verdict, "pass", "{name} with {scales}: {:?}", found.mismatches);
             count += usize::from(!scaled.graph.scales.is_empty());
-            let text = write::write(&scaled.translation.netlist);
+            // With its subcircuits, where it has any; its flat text at odd factors.
+            let text = match scales {
+                "auto" => write::write(&scaled.nested(&map).netlist),
+                _ => write::write(&scaled.translation.netlist),
+            };
+            nested += usize::from(text.contains(".subckt"));
             let found = certificate(&mut map, &scaled, &text).unwrap();
             let first = found.first().map(|first| first.line());
             assert!(found.holds(), "{name} with {scales}: {first:?}");
         }
     }
-    assert!(count >= 25, "{count} were scaled");
+    assert!(count >= 25 && nested >= 12, "{count} were scaled, {nested} with subcircuits");
 }
 
 #[test]

@@ -8,9 +8,9 @@ use bondspice::bond::elaborate::Overrides;
 use bondspice::circuit::{Circuit, DeviceKind, Expr, Leaf};
 use bondspice::cli::pipeline::run_text;
 use bondspice::netlist::dialects::{self, DIALECTS, Written};
-use bondspice::netlist::{Netlist, flatten::flatten};
+use bondspice::netlist::{CardKind, Netlist, flatten::flatten};
 use bondspice::source::SourceMap;
-use bondspice::trace::{Trace, compare};
+use bondspice::trace::{Trace, compare, formats};
 use std::collections::HashMap;
 use std::process::Command;
 use translated::{models, translated};
@@ -187,6 +187,94 @@ fn spellings_of_conditions_and_tables() {
             "b2 c 0 V={if((abs(v(a)) > 0),table(v(a),0,1,2,5),3)}"
         ]
     );
+}
+
+/// A name as a simulator heads its column with it, of one that is ngspice's: `i(h.x_motor.h_emf_1)`.
+type Heading = fn(&str) -> String;
+
+/// The path of a name and what it is called there, without the letter that ngspice puts before a path.
+fn place(name: &str) -> (char, Option<(String, String)>) {
+    let letter = name.chars().next().unwrap();
+    let inner = &name[2..name.len() - 1];
+    let Some((path, own)) = inner.rsplit_once('.') else { return (letter, None) };
+    let path = if letter == 'i' { path.split_once('.').unwrap().1 } else { path };
+    (letter, Some((path.replace('.', ":"), own.to_string())))
+}
+
+/// Columns of the simulators as they spell paths; of LTspice both spellings that are told of currents.
+const HEADINGS: [(&str, &str, Heading); 4] = [
+    ("ngspice", "raw", |name| name.to_lowercase()),
+    ("xyce", "csv", |name| match place(name) {
+        (letter, Some((path, own))) => format!("{letter}({path}:{own})").to_uppercase(),
+        _ => name.to_uppercase(),
+    }),
+    ("ltspice", "ltspice", |name| match place(name) {
+        (letter, Some((path, own))) => format!("{}({path}:{own})", letter.to_uppercase()),
+        _ => format!("{}{}", name[..1].to_uppercase(), &name[1..]),
+    }),
+    ("ltspice", "ltspice", |name| match place(name) {
+        ('i', Some((path, own))) => {
+            format!("I({}:{}:{})", &own[..1], path.to_lowercase(), &own[1..])
+        }
+        (letter, Some((path, own))) => {
+            format!("{}({}:{own})", letter.to_uppercase(), path.to_lowercase())
+        }
+        _ => name.to_string(),
+    }),
+];
+
+/// Results of nested netlists, headed as their simulators would head them, come back under the names of the bond graph.
+#[test]
+fn results_in_each_spelling_of_paths_get_the_names_of_the_bond_graph() {
+    let folder = tempfile::tempdir().unwrap();
+    let bondspice = |arguments: &[&str]| {
+        let program = Command::new(env!("CARGO_BIN_EXE_bondspice"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&program.stderr).to_string();
+        assert!(program.status.success() && said.is_empty(), "{arguments:?}: {said}");
+    };
+    let read = |name: &str| {
+        let path = folder.path().join(name);
+        formats::read(name, &std::fs::read(path).unwrap()).unwrap()
+    };
+    for name in ["drive_train", "servo_axis"] {
+        let path = translated::root().join(format!("models/{name}.bg"));
+        let path = path.to_str().unwrap();
+        bondspice(&["simulate", path, "-q", "-o", "ours.csv"]);
+        let ours = read("ours.csv");
+        let model = translated(std::path::Path::new(&format!("{name}.bg")), &Overrides::default());
+        let saved = model.nested.netlist.cards.iter().find_map(|card| match &card.kind {
+            CardKind::Save { items, .. } => Some(items.iter().map(|(text, _)| text.clone())),
+            _ => None,
+        });
+        let saved: Vec<String> = saved.unwrap().collect();
+        assert!(saved.iter().any(|name| name.contains(".X_")), "{saved:?}");
+        let observe = Some(saved.join(", "));
+        let overrides = Overrides { observe, ..Overrides::default() };
+        let (theirs, _) = run_text("deck.cir", &model.text(), &overrides).unwrap();
+        for (dialect, ending, heading) in HEADINGS {
+            let arguments = ["convert", path, "-q", "--to", dialect, "-o", "deck.cir", "--map"];
+            bondspice(&[&arguments[..], &["map.json"]].concat());
+            let mut result = theirs.clone();
+            result.names[1..].iter_mut().for_each(|name| *name = heading(name));
+            let file = format!("result.{}", if ending == "csv" { "csv" } else { "raw" });
+            let format = formats::FORMATS.iter().find(|format| format.name == ending).unwrap();
+            let mut bytes = vec![];
+            (format.write)(&result, &formats::Heading::default(), &mut bytes).unwrap();
+            std::fs::write(folder.path().join(&file), bytes).unwrap();
+            bondspice(&["trace", &file, "--map", "map.json", "-o", "named.csv"]);
+            let named = read("named.csv");
+            assert_eq!(named.names, ours.names, "{name} for {dialect}");
+            // What the subcircuit's run differs in: as much as rounding makes of a step's choice.
+            let settings = compare::Settings { tolerance: 1e-5, rise: None, signals: None };
+            let found = compare::compare(&named, &ours, &settings);
+            let worst = found.signals.iter().map(|s| s.max).fold(0.0, f64::max);
+            assert!(found.missing.is_empty() && worst <= 1e-5, "{name} for {dialect}: {worst:e}");
+        }
+    }
 }
 
 /// Whether gnucap is there; where it must be and is not, the test fails.

@@ -1,5 +1,7 @@
 //! Models, instances, arrays and imports mean the flat graphs that one would write by hand.
 
+mod subcircuits;
+
 use bondspice::bond::causality;
 use bondspice::bond::elaborate::{self, Overrides};
 use bondspice::bond::graph::BondGraph;

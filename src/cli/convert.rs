@@ -10,7 +10,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects;
 use crate::quantity::nearest;
 use crate::source::Span;
-use crate::translate::{self, map::MapCard};
+use crate::translate::map::MapCard;
 use std::path::Path;
 
 /// What it does, in a line.
@@ -32,7 +32,8 @@ pub struct Arguments {
     /// Where to write the netlist
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
-    /// The simulator that shall read it: ngspice, xyce, ltspice, gnucap, saber
+    /// The simulator that shall read it: ngspice, xyce, ltspice (instances as subcircuits); gnucap, saber (one flat
+    /// circuit)
     #[arg(long, value_name = "SIMULATOR", default_value = "ngspice")]
     to: String,
     /// Scale domains, powers unchanged, for simulators with absolute tolerances: auto or DOMAIN=FACTOR,… (efforts are
@@ -83,25 +84,14 @@ fn convert(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
     let Some(model) = model else { return Err(session.exit()) };
-    let (netlist, mut map) = match arguments.flat || !dialect.nested {
-        true => (model.translation.netlist, model.translation.map),
-        false => {
-            let nested = translate::hierarchy::fold(
-                &model.graph,
-                &model.causality,
-                &session.map,
-                &model.translation,
-            );
-            (nested.netlist, nested.map)
-        }
-    };
+    let (netlist, mut map) = model.netlist(&session.map, dialect, arguments.flat);
     let mut d = vec![];
     let written = dialect.write(&netlist, &mut d);
     session.say(d);
     let Some(written) = written else { return Err(session.exit()) };
     write_text(arguments.output.as_deref(), &written.text, session)?;
     // The map holds what was added, too.
-    map.dialect = dialect.name;
+    map.dialect = dialect;
     for (card, of) in written.senses {
         map.figures.nodes += 1;
         map.figures.devices += 1;

@@ -10,6 +10,7 @@ pub mod flags;
 pub mod watch;
 pub mod deck;
 pub mod pipeline;
+pub mod proof;
 pub mod run;
 pub mod list;
 pub mod check;

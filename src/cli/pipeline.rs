@@ -2,6 +2,7 @@
 
 use super::emit::{self, Stage};
 use super::flags::how;
+pub use super::proof::{Question, certificate, verify};
 pub use super::run::{Run, prepare, ready, run_text};
 use super::session::{Exit, Session};
 use crate::bond::causality::{self, Causality};
@@ -14,17 +15,14 @@ use crate::circuit::Circuit;
 use crate::circuit::stamps;
 use crate::diagnostic::{Diagnostic, has_errors, merge_repeats};
 use crate::netlist::analysis::{Analysis, Sweep};
-use crate::netlist::dialects::{Dialect, NGSPICE};
+use crate::netlist::dialects::Dialect;
 use crate::netlist::header::Header;
-use crate::netlist::read::How;
-use crate::netlist::{CardKind, Netlist, flatten, read, write};
+use crate::netlist::{Card, CardKind, Netlist, flatten, read, write};
 use crate::quantity::{did_you_mean, nearest};
-use crate::sim::{self, FailureKind, Settings};
+use crate::sim::{self, Settings};
 use crate::source::{FileId, SourceMap, Span};
 use crate::translate::hierarchy::{self, Hierarchy};
-use crate::translate::{self, Translation};
-use crate::verify::{self, Report, Times};
-use std::time::Instant;
+use crate::translate::{self, Map, Translation};
 
 /// What a text is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,6 +183,26 @@ impl Model {
     /// The circuit with the graph's instances as subcircuits.
     pub fn nested(&self, map: &SourceMap) -> Hierarchy {
         hierarchy::fold(&self.graph, &self.causality, map, &self.translation)
+    }
+
+    /// The circuit as it is written in a dialect, and its map: with subcircuits where the dialect takes them and no flat
+    /// one is asked for.
+    pub fn netlist(&self, map: &SourceMap, dialect: &Dialect, flat: bool) -> (Netlist, Map) {
+        if dialect.nested && !flat {
+            let nested = self.nested(map);
+            return (nested.netlist, nested.map);
+        }
+        let (mut netlist, map) = (self.translation.netlist.clone(), self.translation.map.clone());
+        if self.graph.tree.len() > 1 {
+            let why = match dialect.nested {
+                true => "as asked for".to_string(),
+                false => format!("{} gets no subcircuits", dialect.name),
+            };
+            let text = format!(" one flat circuit, {why}: instances stand laid open");
+            let kind = CardKind::Comment(text);
+            netlist.cards.insert(0, Card { kind, span: Span::NONE, comment: None });
+        }
+        (netlist, map)
     }
 }
 
@@ -359,135 +377,4 @@ pub fn emit(
         (Some(text), Exit::Fine) => Ok(text),
         (_, exit) => Err(exit),
     }
-}
-
-/// What `verify` is asked about.
-#[derive(Clone, Debug, Default)]
-pub struct Question {
-    /// A netlist other than the translation's own.
-    pub netlist: Option<FileId>,
-    /// A map of it other than the translation's own, as JSON.
-    pub map: Option<serde_json::Value>,
-    /// The dialect that the translation's own is written in, where that is not ngspice.
-    pub to: Option<&'static Dialect>,
-    /// What random numbers follow from.
-    pub seed: Option<u64>,
-}
-
-/// The certificate: the text of a netlist against the bond graph, then both routes over one experiment. The text is
-/// written and read back where none is given. `adapt` may change how the circuit is run. `Ok(None)` when there were
-/// errors.
-///
-/// # Errors
-/// Why the circuit's run did not reach its end.
-pub fn verify(
-    map: &mut SourceMap,
-    file: FileId,
-    overrides: &Overrides,
-    question: &Question,
-    d: &mut Vec<Diagnostic>,
-    adapt: impl FnOnce(&mut Settings),
-) -> Result<Option<Report>, FailureKind> {
-    let demands = verify::Settings::default();
-    if language(map, file) != Language::Bond {
-        let message = "only a bond graph can be verified";
-        d.push(Diagnostic::error("E0944", Span::NONE, message));
-        return Ok(None);
-    }
-    let Some(model) = model(map, file, overrides, d) else { return Ok(None) };
-    let begin = Instant::now();
-    let Some((mut certificate, netlist)) = certificate(map, &model, question, &how(overrides), d)
-    else {
-        return Ok(None);
-    };
-    if !model.graph.scales.is_empty() {
-        let plain = Overrides { scale: vec![], ..overrides.clone() };
-        let Some(plain) = self::model(map, file, &plain, &mut vec![]) else { return Ok(None) };
-        certificate.scaling = Some(verify::scaling(
-            [&plain.graph, &model.graph],
-            [&plain.initial, &model.initial],
-            &overrides.scale,
-            question.seed.unwrap_or(verify::SEED),
-        ));
-    }
-    let mut times = Times { text: begin.elapsed().as_secs_f64(), ..Times::default() };
-    if !certificate.holds() || model.graph.experiment.until.is_none() {
-        return Ok(Some(Report::of_text(certificate).timed(times)));
-    }
-    let circuit = flatten::flatten(&netlist, d).map(|mut circuit| {
-        let given = overrides.options.iter();
-        if !given.clone().any(|(key, _)| key.eq_ignore_ascii_case("reltol")) {
-            circuit.options.push(("reltol".into(), format!("{:e}", demands.reltol)));
-        }
-        circuit
-    });
-    let run = circuit.and_then(|circuit| ready(circuit, &deck_units(&netlist), true, None, d));
-    let Some(mut run) = run else { return Ok(None) };
-    if let Some(settings) = &mut run.settings {
-        adapt(settings);
-    }
-    let mut trace = run.trace();
-    let begin = Instant::now();
-    if let Err(failure) = run.go(&mut trace) {
-        if failure.kind != FailureKind::Interrupted {
-            d.push(*failure.diagnostic);
-        }
-        return Err(failure.kind);
-    }
-    times.circuit = begin.elapsed().as_secs_f64();
-    let begin = Instant::now();
-    let report = verify::judge(&model.graph, &model.causality, &trace, &demands, d);
-    times.second = begin.elapsed().as_secs_f64();
-    Ok(report.map(|report| report.with(certificate).timed(times)))
-}
-
-/// The parts of the certificate that look at the text alone, and the netlist that was read from it.
-pub fn certificate(
-    map: &mut SourceMap,
-    model: &Model,
-    question: &Question,
-    how: &How,
-    d: &mut Vec<Diagnostic>,
-) -> Option<(verify::Certificate, Netlist)> {
-    let ours = &model.translation.netlist;
-    let netlist = match question.netlist {
-        Some(file) => read::read(map, file, how, d),
-        None => {
-            let dialect = question.to.unwrap_or(&NGSPICE);
-            let text = match dialect.nested {
-                true => dialect.write(&model.nested(map).netlist, d)?.text,
-                false => dialect.write(ours, d)?.text,
-            };
-            let file = map.add(format!("{}.cir", model.graph.name), text);
-            read::read(map, file, &How::of(dialect), d)
-        }
-    };
-    if has_errors(d) {
-        return None;
-    }
-    let mut translation = model.translation.clone();
-    // A text with subcircuits has other names than a flat one.
-    if netlist.cards.iter().any(|card| matches!(card.kind, CardKind::Subcircuit(_))) {
-        let nested = model.nested(map);
-        (translation.netlist, translation.map) = (nested.netlist, nested.map);
-    }
-    // What the dialect cannot say has been said; a text in it may stand for the model nevertheless.
-    if let Some(written) = netlist.dialect.write(&translation.netlist, &mut vec![]) {
-        translation.netlist = written.netlist;
-    }
-    if let Some(json) = &question.map {
-        match translate::Map::from_json(json, &mut translation.netlist.names) {
-            Some(map) => {
-                translation.map = translate::Map { parameters: translation.map.parameters, ..map }
-            }
-            None => {
-                let message = "this is no map as `convert --map` writes it";
-                d.push(Diagnostic::error("E0944", Span::NONE, message));
-                return None;
-            }
-        }
-    }
-    let seed = question.seed.unwrap_or(verify::SEED);
-    let found = verify::certify(&model.graph, &model.initial, &translation, &netlist, seed, d)?;
-    Some((found, netlist))
 }

@@ -4,13 +4,12 @@ use super::output::Output;
 use super::session::{Exit, Session};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Expr;
-use crate::netlist::read::How;
-use crate::netlist::{self, CardKind, Element, Leaf, Netlist};
-use crate::source::{SourceMap, Span};
+use crate::netlist::{self, Leaf, Names};
+use crate::source::Span;
 use crate::trace::formats::Heading;
 use crate::trace::{Trace, send};
-use serde::Deserialize;
-use std::collections::HashSet;
+use crate::translate::Map;
+use std::collections::{HashMap, HashSet};
 
 /// What it does, in a line.
 pub const ABOUT: &str = "Rename another simulator's result into bond-graph names and units";
@@ -41,28 +40,6 @@ pub struct Arguments {
     all: bool,
 }
 
-/// The part of a map that is read here.
-#[derive(Deserialize)]
-struct Map {
-    variables: Vec<Variable>,
-}
-
-#[derive(Deserialize)]
-struct Variable {
-    bg: String,
-    expr: Option<String>,
-    #[serde(default = "one")]
-    factor: f64,
-    #[serde(default)]
-    unit: String,
-    #[serde(default)]
-    observed: bool,
-}
-
-fn one() -> f64 {
-    1.0
-}
-
 /// Renames.
 pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
     match rename_file(&arguments, session) {
@@ -75,14 +52,16 @@ fn rename_file(arguments: &Arguments, session: &mut Session) -> Result<(), Exit>
     let mut trace = session.load_trace(&arguments.trace)?;
     if let Some(name) = &arguments.map {
         let text = session.load_text(name)?;
-        let mut map: Map = serde_json::from_str(&text).map_err(|error| {
+        let mut names = Names::default();
+        let json = serde_json::from_str(&text).map_err(|error| error.to_string());
+        let map = json.and_then(|json| Map::from_json(&json, &mut names));
+        let mut map = map.map_err(|why| {
             let message = format!("`{name}` is no map of variables");
-            let diagnostic = Diagnostic::error("E0930", Span::NONE, message);
-            session.fail(diagnostic.because(error.to_string()))
+            session.fail(Diagnostic::error("E0930", Span::NONE, message).because(why))
         })?;
         choose(&mut map, arguments.all);
         let mut d = vec![];
-        let renamed = rename(&trace, &map, &mut d);
+        let renamed = rename(&trace, &map, &names, &mut d);
         session.say(d);
         trace = renamed.ok_or_else(|| session.exit())?;
     }
@@ -106,28 +85,16 @@ fn choose(map: &mut Map, all: bool) {
 
 /// The variables of a map over the columns of a trace. Variables that need a column which the trace lacks are left
 /// out, with a note.
-fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
-    let (netlist, places) = expressions(map);
+fn rename(trace: &Trace, map: &Map, names: &Names, d: &mut Vec<Diagnostic>) -> Option<Trace> {
+    let columns = Columns::of(trace);
     // The abscissa and what counts runs stay.
     let kept = trace.abscissa() + 1;
     let mut result = Trace::new(trace.names[..kept].to_vec(), trace.units[..kept].to_vec());
     result.columns = trace.columns[..kept].to_vec();
     let mut lacking = vec![];
-    for (variable, place) in map.variables.iter().zip(places) {
-        let law = place.and_then(|at| match &netlist.cards[at].kind {
-            CardKind::Device(device) => match &device.element {
-                Element::BehaviouralVoltage { law } => Some(law),
-                _ => None,
-            },
-            _ => None,
-        });
-        let Some(law) = law else {
-            let text = variable.expr.as_deref().unwrap_or("");
-            let message = format!("`{text}` of `{}` is no expression", variable.bg);
-            d.push(Diagnostic::error("E0930", Span::NONE, message));
-            return None;
-        };
-        match column(trace, &netlist, law) {
+    for variable in &map.variables {
+        let Some(expr) = &variable.expr else { continue };
+        match columns.values(names, expr) {
             Ok(values) => {
                 result.names.push(variable.bg.clone());
                 result.units.push(variable.unit.clone());
@@ -151,56 +118,82 @@ fn rename(trace: &Trace, map: &Map, d: &mut Vec<Diagnostic>) -> Option<Trace> {
     Some(result)
 }
 
-/// The expressions of a map as laws of a netlist, so that they are read as the netlist's own; and for each variable
-/// the card that holds it.
-fn expressions(map: &Map) -> (Netlist, Vec<Option<usize>>) {
-    let mut text = String::from("map\n");
-    for (at, variable) in map.variables.iter().enumerate() {
-        let line = variable.expr.as_deref().unwrap_or("").replace(['\n', '\r'], " ");
-        text += &format!("B_{at} x_ 0 V={line}\n");
-    }
-    let mut sources = SourceMap::default();
-    let file = sources.add("<map>", text + ".end\n");
-    let netlist = netlist::read::read(&mut sources, file, &How::default(), &mut vec![]);
-    let place = |at: usize| {
-        let name = netlist.names.find(&format!("b_{at}"))?;
-        let is = |kind: &CardKind| matches!(kind, CardKind::Device(device) if device.name == name);
-        netlist.cards.iter().position(|card| is(&card.kind))
-    };
-    let places = (0..map.variables.len()).map(place).collect();
-    (netlist, places)
+/// The columns of a result by their names, in whatever way its simulator spells paths into subcircuits.
+struct Columns<'t> {
+    trace: &'t Trace,
+    folded: HashMap<String, usize>,
 }
 
-/// The values of an expression, or the first column that it lacks.
-fn column(trace: &Trace, netlist: &Netlist, law: &netlist::Expr) -> Result<Vec<f64>, String> {
-    let named = |name: &str| trace.column(name).ok_or(name.to_string());
-    let voltage = |name| match netlist.names.text(name) {
-        "0" => Ok(None),
-        node => named(&format!("v({node})")).map(Some),
-    };
-    let mut columns: Vec<[Option<&[f64]>; 2]> = vec![];
-    let indexed = law.try_map(&mut |leaf, _| {
-        columns.push(match leaf {
-            Leaf::Voltage(a, b) => [voltage(*a)?, b.map(voltage).transpose()?.flatten()],
-            Leaf::Current(device) => {
-                let name = netlist.names.text(*device).to_lowercase();
-                [Some(named(&format!("i({name})"))?), None]
-            }
-            Leaf::Parameter(name) | Leaf::Power(name) => {
-                return Err(netlist.names.text(*name).to_string());
-            }
-            Leaf::Part(part, _) => return Err(part.name().to_string()),
-            Leaf::Time => [Some(trace.time()), None],
-            Leaf::Operator(..) => return Err("a value of the past".to_string()),
+impl<'t> Columns<'t> {
+    fn of(trace: &'t Trace) -> Columns<'t> {
+        let mut folded = HashMap::new();
+        for (at, name) in trace.names.iter().enumerate() {
+            folded.entry(fold(name)).or_insert(at);
+        }
+        Columns { trace, folded }
+    }
+
+    /// The column of a node or a device.
+    fn named(&self, wishes: &[String]) -> Result<&'t [f64], String> {
+        let found = wishes.iter().find_map(|wish| {
+            let at = self.trace.position(wish).or_else(|| self.folded.get(&fold(wish)).copied());
+            Some(self.trace.columns[at?].as_slice())
         });
-        Ok(Expr::leaf(columns.len() - 1))
-    })?;
-    let at = |column: Option<&[f64]>, row: usize| column.map_or(0.0, |values| values[row]);
-    let value = |row: usize| {
-        indexed.evaluate(&mut |k: &usize| {
-            let [plus, minus] = columns[*k];
-            at(plus, row) - at(minus, row)
-        })
-    };
-    Ok((0..trace.rows()).map(value).collect())
+        found.ok_or_else(|| wishes.first().cloned().unwrap_or_default())
+    }
+
+    /// The values of an expression, or the first column that is lacking.
+    fn values(&self, names: &Names, law: &netlist::Expr) -> Result<Vec<f64>, String> {
+        let voltage = |name| match names.text(name) {
+            "0" => Ok(None),
+            node => self.named(&[format!("v({node})")]).map(Some),
+        };
+        let mut columns: Vec<[Option<&[f64]>; 2]> = vec![];
+        let indexed = law.try_map(&mut |leaf, _| {
+            columns.push(match leaf {
+                Leaf::Voltage(a, b) => [voltage(*a)?, b.map(voltage).transpose()?.flatten()],
+                Leaf::Current(device) => [Some(self.named(&currents(names.text(*device)))?), None],
+                Leaf::Parameter(name) | Leaf::Power(name) => {
+                    return Err(names.text(*name).to_string());
+                }
+                Leaf::Part(part, _) => return Err(part.name().to_string()),
+                Leaf::Time => [Some(self.trace.time()), None],
+                Leaf::Operator(..) => return Err("a value of the past".to_string()),
+            });
+            Ok(Expr::leaf(columns.len() - 1))
+        })?;
+        let at = |column: Option<&[f64]>, row: usize| column.map_or(0.0, |values| values[row]);
+        let value = |row: usize| {
+            indexed.evaluate(&mut |k: &usize| {
+                let [plus, minus] = columns[*k];
+                at(plus, row) - at(minus, row)
+            })
+        };
+        Ok((0..self.trace.rows()).map(value).collect())
+    }
+}
+
+/// A name as every simulator would spell it: `V(X1:N)` is `v(x1.n)`.
+fn fold(name: &str) -> String {
+    name.to_lowercase().replace(':', ".")
+}
+
+/// What the current of a device may be called: `i(x1.h_emf)`; with its letter before the path, `i(h.x1.h_emf)`; and with
+/// that in the place of the one at its own name, `i(h.x1._emf)`.
+fn currents(device: &str) -> Vec<String> {
+    let mut wishes = vec![format!("i({device})")];
+    let Some((path, own)) = device.rsplit_once('.') else { return wishes };
+    let Some(letter) = own.get(..1) else { return wishes };
+    match path.split_once('.') {
+        // As ngspice writes it, its letter stands there already.
+        Some((first, rest)) if first.eq_ignore_ascii_case(letter) => {
+            wishes.extend([format!("i({rest}.{own})"), format!("i({path}.{})", &own[1..])]);
+        }
+        _ => {
+            let lettered =
+                [format!("i({letter}.{device})"), format!("i({letter}.{path}.{})", &own[1..])];
+            wishes.extend(lettered);
+        }
+    }
+    wishes
 }

@@ -94,7 +94,8 @@ pub const SWITCHING_HYSTERESIS: Lack = Lack {
 pub struct Adapted {
     /// In the dialect's words.
     pub netlist: Netlist,
-    /// 0 V sources, each with the device whose current it carries.
+    /// 0 V sources, each with the device whose current it carries; those of a subcircuit once for each instance, by their
+    /// paths.
     pub senses: Vec<(String, String)>,
 }
 
@@ -125,7 +126,41 @@ pub fn adapt(netlist: &Netlist, dialect: &Dialect, d: &mut Vec<Diagnostic>) -> O
     let mut cards = std::mem::take(&mut netlist.cards);
     scope(&mut cards, &mut netlist.names, dialect, &mut senses);
     netlist.cards = cards;
-    Some(Adapted { netlist, senses })
+    let mut placed = vec![];
+    if !senses.is_empty() {
+        place(&netlist, &netlist.cards, "", &senses, &mut placed);
+    }
+    Some(Adapted { netlist, senses: placed })
+}
+
+/// Subcircuits within one another whose senses are still told one by one.
+const DEEP: usize = 64;
+
+/// Finds the senses of a block of cards and of the instances in it.
+fn place(
+    netlist: &Netlist,
+    cards: &[Card],
+    path: &str,
+    senses: &[(String, String)],
+    placed: &mut Vec<(String, String)>,
+) {
+    for card in cards {
+        let CardKind::Device(device) = &card.kind else { continue };
+        let name = netlist.names.text(device.name);
+        if let Element::Instance { subcircuit, .. } = &device.element
+            && path.matches('.').count() < DEEP
+        {
+            let definition = netlist.cards.iter().find_map(|card| match &card.kind {
+                CardKind::Subcircuit(own) if own.name == *subcircuit => Some(own),
+                _ => None,
+            });
+            if let Some(own) = definition {
+                place(netlist, &own.cards, &format!("{path}{name}."), senses, placed);
+            }
+        } else if let Some((_, carried)) = senses.iter().find(|(carrier, _)| carrier == name) {
+            placed.push((format!("{path}{name}"), format!("{path}{carried}")));
+        }
+    }
 }
 
 /// The error that a dialect lacks what a card of this name needs.

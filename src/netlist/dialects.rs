@@ -275,6 +275,12 @@ impl std::fmt::Debug for Dialect {
     }
 }
 
+impl PartialEq for Dialect {
+    fn eq(&self, other: &Dialect) -> bool {
+        self.name == other.name
+    }
+}
+
 impl Default for &'static Dialect {
     /// What a netlist is in that says nothing else.
     fn default() -> Self {
@@ -302,7 +308,8 @@ pub struct Written {
     pub netlist: Netlist,
     /// As text.
     pub text: String,
-    /// What was added: 0 V sources that carry the current of another device, each with that device's name.
+    /// What was added: 0 V sources that carry the current of another device, each with that device's name, by their paths
+    /// into subcircuits.
     pub senses: Vec<(String, String)>,
 }
 

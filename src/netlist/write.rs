@@ -115,7 +115,12 @@ pub(super) fn text(netlist: &Netlist, dialect: &Dialect) -> String {
 
 /// An expression as a netlist for ngspice writes it.
 pub fn expression(names: &Names, expr: &Expr) -> String {
-    Form { names, dialect: &NGSPICE }.expression(expr)
+    expression_in(&NGSPICE, names, expr)
+}
+
+/// An expression as a netlist in a dialect writes it.
+pub fn expression_in(dialect: &Dialect, names: &Names, expr: &Expr) -> String {
+    Form { names, dialect }.expression(expr)
 }
 
 /// A card that holds no others, on one line, as for ngspice.

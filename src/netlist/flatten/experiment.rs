@@ -5,7 +5,7 @@ use super::kinds;
 use super::scope::{self, TOP};
 use super::values::Lookup;
 use crate::circuit::{self, Analysis, Circuit, NodeId, Output};
-use crate::diagnostic::{Diagnostic, Severity};
+use crate::diagnostic::{Diagnostic, Severity, has_errors};
 use crate::netlist::analysis::{Analysis as WantedAnalysis, Print};
 use crate::netlist::dialects::NGSPICE;
 use crate::netlist::header::Header;
@@ -215,8 +215,12 @@ fn print_of(analysis: &Analysis) -> Print {
     }
 }
 
-/// The columns of the header. Their expressions stand in no text that a message could point at.
+/// The columns of the header. Their expressions stand in no text that a message could point at; what they lack follows
+/// from what is wrong elsewhere, where anything is.
 fn columns(flat: &Flat, header: &Header, outputs: &mut Vec<Output>, d: &mut Vec<Diagnostic>) {
+    if has_errors(d) {
+        return;
+    }
     let mut names = flat.netlist.names.clone();
     let mut read = vec![];
     for column in &header.columns {

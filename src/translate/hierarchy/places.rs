@@ -1,9 +1,9 @@
 //! Which subcircuit each card stands in, and which instances stand inlined because they could not be one.
 //!
 //! A card reads voltages by nodes, which are handed through as terminals, but currents and parameters by names, which
-//! end at the edge of a subcircuit. So a card of signals that reads a current inside an instance moves in there, and
-//! its node becomes a terminal: that is how a model's flow is observed from outside, at no cost. What cannot move
-//! inlines the instances between.
+//! end at the edge of a subcircuit. So a card of signals that reads a current inside an instance, or divides by the value
+//! of its resistance, moves in there, and its node becomes a terminal: that is how a model's flow is observed from
+//! outside, at no cost. What cannot move inlines the instances between.
 
 use super::parts::Part;
 use super::tree::Tree;
@@ -19,6 +19,13 @@ pub struct Owners {
     pub devices: HashMap<Name, usize>,
     /// The instance of each parameter.
     pub parameters: HashMap<Name, u32>,
+}
+
+impl Owners {
+    /// The subcircuit that a parameter stands in; 0 for those of the file, which are known everywhere.
+    fn scope(&self, parameter: Name, tree: &Tree) -> u32 {
+        self.parameters.get(&parameter).map_or(0, |owner| tree.scope(*owner))
+    }
 }
 
 /// Finds a subcircuit for each part, inlining instances until each can be had.
@@ -38,12 +45,11 @@ pub fn places(parts: &[Part], owners: &Owners, tree: &mut Tree, names: &Names) -
                 meet(tree, here, there, &format!("{what} reads the current of {device}"));
             }
             for parameter in &part.parameters {
-                let Some(owner) = owners.parameters.get(parameter) else { continue };
+                let there = owners.scope(*parameter, tree);
                 // Those of the file are known everywhere.
-                if *owner > 0 {
+                if there > 0 {
                     let parameter = names.text(*parameter);
-                    let why = format!("{what} uses the value of {parameter}");
-                    meet(tree, here, tree.scope(*owner), &why);
+                    meet(tree, here, there, &format!("{what} uses the value of {parameter}"));
                 }
             }
         }
@@ -53,20 +59,17 @@ pub fn places(parts: &[Part], owners: &Owners, tree: &mut Tree, names: &Names) -
     }
 }
 
-/// Moves a card of signals to where the one current stands that it reads, further in.
+/// Moves a card of signals to where the one current, or the values, stand that it reads, further in.
 fn move_in(at: usize, part: &Part, owners: &Owners, tree: &Tree, places: &mut Places) {
     let here = places[at];
     let theirs = part.devices.iter().filter_map(|device| owners.devices.get(device));
+    let values = part.parameters.iter().map(|name| owners.scope(*name, tree));
     let mut there: Vec<u32> = theirs.map(|other| places[*other]).collect();
+    there.extend(values.filter(|scope| *scope > 0));
     there.sort_unstable();
     there.dedup();
     let [inner] = there[..] else { return };
-    let known = |name: &Name| {
-        let owner = owners.parameters.get(name).copied().unwrap_or(0);
-        owner == 0 || tree.scope(owner) == inner
-    };
-    let free = !part.power && part.parameters.iter().all(known);
-    if free && inner != here && tree.within(inner, here) {
+    if !part.power && inner != here && tree.within(inner, here) {
         places[at] = inner;
     }
 }

@@ -1,24 +1,24 @@
 //! The map: which circuit variable is which effort, flow, state and signal of the bond graph.
 
+mod json;
+
 use super::Builder;
 use super::names::Renamed;
 use super::values::Speaker;
 use crate::bond::graph::{self, BondId, Law, Power, SignalOrigin, Storage};
 use crate::expr::{Binary, Node, Unary};
-use crate::netlist::dialects::NGSPICE;
-use crate::netlist::read::expression::expression as expression_of;
+use crate::netlist::dialects::{Dialect, NGSPICE};
 use crate::netlist::write::expression;
 use crate::netlist::{CardKind, Expr, Leaf, Name, Names};
 use crate::quantity::Domain;
-use crate::source::FileId;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
 /// The map of a translation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// The dialect whose names it uses.
-    pub dialect: &'static str,
+    /// The dialect whose spelling it has as text.
+    pub dialect: &'static Dialect,
     /// Observed columns first, then all variables of the graph in file order.
     pub variables: Vec<Variable>,
     /// Devices and where they come from, in the order of the netlist.
@@ -121,127 +121,6 @@ impl Map {
         }
         spoken
     }
-
-    /// The map as JSON, schema 1.
-    pub fn json(&self, names: &Names) -> serde_json::Value {
-        // A result holds no parameters: they stand here as numbers.
-        let value = |expr: &Expr| {
-            expr.map(&mut |leaf, span| match leaf {
-                Leaf::Parameter(name) => match self.parameters.iter().find(|(p, _)| p == name) {
-                    Some((_, value)) => Expr::new(Node::Number(*value), span),
-                    None => Expr::leaf(leaf.clone()),
-                },
-                leaf => Expr::leaf(leaf.clone()),
-            })
-        };
-        let variables: Vec<_> = self
-            .variables
-            .iter()
-            .filter_map(|variable| Some((variable, variable.expr.as_ref()?)))
-            .map(|(variable, expr)| {
-                serde_json::json!({
-                    "bg": variable.bg,
-                    "expr": expression(names, &value(expr)),
-                    "factor": variable.factor,
-                    "unit": variable.unit,
-                    "domain": variable.domain.name(),
-                    "observed": variable.observed,
-                })
-            })
-            .collect();
-        let cards: Vec<_> = self
-            .cards
-            .iter()
-            .map(|card| {
-                serde_json::json!({
-                    "card": card.card,
-                    "element": card.element,
-                    "bond": card.bond,
-                    "line": card.line,
-                })
-            })
-            .collect();
-        let renamed: Vec<_> = self
-            .renamed
-            .iter()
-            .map(|name| serde_json::json!({ "from": name.from, "to": name.to }))
-            .collect();
-        let Figures { nodes, devices, helpers } = self.figures;
-        let scale: serde_json::Map<String, serde_json::Value> = self
-            .scales
-            .iter()
-            .map(|(domain, factor)| (domain.name().to_string(), (*factor).into()))
-            .collect();
-        serde_json::json!({
-            "schema": 1,
-            "dialect": self.dialect,
-            "scale": scale,
-            "variables": variables,
-            "cards": cards,
-            "renamed": renamed,
-            "figures": { "nodes": nodes, "devices": devices, "helpers": helpers },
-        })
-    }
-}
-
-impl Map {
-    /// A map from its JSON, its expressions in the names given. What holds the value of a parameter, which stands there
-    /// as a number, is left without an expression. `None` for anything else.
-    pub fn from_json(json: &serde_json::Value, names: &mut Names) -> Option<Map> {
-        let text =
-            |value: &serde_json::Value, key: &str| Some(value.get(key)?.as_str()?.to_string());
-        let variables = json.get("variables")?.as_array()?.iter().map(|variable| {
-            let written = text(variable, "expr")?;
-            let read = expression_of(&written, names, &NGSPICE, FileId(u32::MAX), 0, &mut vec![]);
-            let unit = text(variable, "unit")?;
-            Some(Variable {
-                bg: text(variable, "bg")?,
-                expr: read.filter(|expr| !holds_number(expr)),
-                factor: variable.get("factor")?.as_f64()?,
-                unit,
-                domain: Domain::Any,
-                observed: variable.get("observed")?.as_bool()?,
-            })
-        });
-        let variables = variables.collect::<Option<Vec<_>>>()?;
-        let cards = json.get("cards")?.as_array()?.iter().map(|card| {
-            let (bond, line) = (text(card, "bond"), card.get("line").and_then(|l| l.as_u64()));
-            let line = line.map(|line| line as usize);
-            Some(MapCard { card: text(card, "card")?, element: text(card, "element")?, bond, line })
-        });
-        let cards = cards.collect::<Option<Vec<_>>>()?;
-        let figures = Figures::default();
-        Some(Map {
-            dialect: "ngspice",
-            variables,
-            cards,
-            parameters: vec![],
-            renamed: vec![],
-            scales: scales(json),
-            figures,
-        })
-    }
-}
-
-/// The scales of a map's JSON.
-fn scales(json: &serde_json::Value) -> Vec<(Domain, f64)> {
-    let scale = json.get("scale").and_then(|scale| scale.as_object());
-    let of = |(name, factor): (&String, &serde_json::Value)| {
-        Some((Domain::named(name)?, factor.as_f64()?))
-    };
-    scale.into_iter().flatten().filter_map(of).collect()
-}
-
-/// Whether a number stands in an expression.
-fn holds_number(expr: &Expr) -> bool {
-    match &*expr.node {
-        Node::Number(_) | Node::Table(..) => true,
-        Node::Leaf(_) => false,
-        Node::Unary(_, a) => holds_number(a),
-        Node::Binary(_, a, b) => holds_number(a) || holds_number(b),
-        Node::Call(_, arguments) => arguments.iter().any(holds_number),
-        Node::If(c, a, b) => [c, a, b].into_iter().any(holds_number),
-    }
 }
 
 impl Builder<'_> {
@@ -269,7 +148,7 @@ impl Builder<'_> {
         let values = self.graph.parameters.iter().map(|parameter| parameter.value);
         let parameters = self.parameters.iter().copied().zip(values).collect();
         let scales = self.graph.scales.iter().map(|scale| (scale.domain, scale.factor)).collect();
-        Map { dialect: "ngspice", variables, cards, parameters, renamed, scales, figures }
+        Map { dialect: &NGSPICE, variables, cards, parameters, renamed, scales, figures }
     }
 
     fn observed(&self) -> Vec<Variable> {
