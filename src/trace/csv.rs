@@ -15,17 +15,19 @@ impl<W: Write> Rows<W> {
     ///
     /// # Errors
     /// What writing failed with.
-    pub fn new(to: W, heading: &Heading, names: &[String], units: &[String]) -> io::Result<Self> {
-        let mut writer = ::csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(to);
-        for (at, name) in names.iter().enumerate() {
-            match units.get(at) {
-                Some(unit) if heading.units && !unit.is_empty() => {
-                    writer.write_field(format!("{name} [{unit}]")).map_err(plain)?;
-                }
-                _ => writer.write_field(name).map_err(plain)?,
-            }
-        }
-        writer.write_record(None::<&[u8]>).map_err(plain)?;
+    pub fn new(
+        mut to: W,
+        heading: &Heading,
+        names: &[String],
+        units: &[String],
+    ) -> io::Result<Self> {
+        let heads = names.iter().enumerate().map(|(at, name)| match units.get(at) {
+            Some(unit) if heading.units && !unit.is_empty() => format!("{name} [{unit}]"),
+            _ => name.clone(),
+        });
+        let line: Vec<String> = heads.map(|head| quoted(&head)).collect();
+        writeln!(to, "{}", line.join(","))?;
+        let writer = ::csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(to);
         Ok(Rows { writer, digits: String::new() })
     }
 
@@ -46,6 +48,35 @@ impl<W: Write> Sink for Rows<W> {
             self.writer.write_field(&self.digits).map_err(plain)?;
         }
         self.writer.write_record(None::<&[u8]>).map_err(plain)
+    }
+}
+
+/// A name as it stands in a header: in quotes where it holds anything that may separate names, or nothing.
+fn quoted(name: &str) -> String {
+    match name.is_empty() || name.contains([',', ';', '\t', '"', '\r', '\n']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")),
+        false => name.to_string(),
+    }
+}
+
+/// What separates the names of a header: a comma, semicolon or tab that stands outside of quotes.
+fn separator(text: &[u8]) -> u8 {
+    let (mut quoted, mut found) = (false, [false; 3]);
+    for byte in text {
+        match byte {
+            b'"' => quoted = !quoted,
+            b'\n' if !quoted => break,
+            _ if quoted => {}
+            b',' => found[0] = true,
+            b';' => found[1] = true,
+            b'\t' => found[2] = true,
+            _ => {}
+        }
+    }
+    match found {
+        [false, true, _] => b';',
+        [false, false, true] => b'\t',
+        _ => b',',
     }
 }
 
@@ -86,10 +117,8 @@ pub fn write(trace: &Trace, heading: &Heading, to: &mut dyn Write) -> io::Result
 /// Reads a trace; commas, semicolons or tabs separate, whichever the header holds.
 pub fn read(bytes: &[u8]) -> Result<Trace, Failed> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let header = bytes.split(|byte| *byte == b'\n').next().unwrap_or(bytes);
-    let separator = *b",;\t".iter().find(|byte| header.contains(byte)).unwrap_or(&b',');
     let mut reader = ::csv::ReaderBuilder::new()
-        .delimiter(separator)
+        .delimiter(separator(bytes))
         .has_headers(false)
         .flexible(true)
         .trim(::csv::Trim::All)
