@@ -1,6 +1,6 @@
 //! The bad file that explains each code, one a line, in the order of the codes.
 //!
-//! Written by `GALLERY=write cargo test --test gallery`: the smallest file of the gallery that shows the code and what
+//! Written by `GALLERY=write cargo test --test tools gallery`: the smallest file of the gallery that shows the code and what
 //! would be right. A line that does so stays as it is, so another file may be put here by hand; a line whose file is
 //! gone is deleted by hand first.
 

@@ -1,0 +1,17 @@
+//! Decks: reading, analyses, measures, formats, and what other simulators make of them.
+
+#[path = "../peers/mod.rs"]
+mod peers;
+mod small_signal;
+
+mod analyses;
+mod fourier;
+mod poles;
+mod sensitivity;
+mod measures;
+mod difficult_decks;
+mod decks_in_ngspice;
+mod expressions_in_ngspice;
+mod formats;
+mod reading;
+mod xyce;
