@@ -327,7 +327,7 @@ impl Builder<'_> {
 }
 
 /// More random numbers than this are no netlist.
-const MOST_HELD: f64 = 1e5;
+pub(crate) const MOST_HELD: f64 = 1e5;
 
 /// Refuses noise whose numbers, written out to the end of the run, would be too many.
 fn noise_lengths(graph: &BondGraph, diagnostics: &mut Vec<Diagnostic>) {

@@ -351,7 +351,8 @@ impl Builder<'_> {
                 let until = experiment.until.unwrap_or(1.0);
                 let rise = rise.min(RISE * dt);
                 let mut arguments = vec![];
-                for k in 0..=(until / dt).floor() as u64 {
+                // What is longer is refused, and need not be made.
+                for k in 0..=(until / dt).floor().min(super::MOST_HELD) as u64 {
                     let (begin, level) = (k as f64 * dt, rms * random::normal(seed, k));
                     let begin = if k > 0 { begin + rise } else { begin };
                     let end = (k + 1) as f64 * dt;
