@@ -101,7 +101,12 @@ pub(crate) struct Network<'a> {
     frozen: Matrix,
     /// α of the factorised dynamic matrix, where it depends on nothing else.
     factored_alpha: Option<f64>,
+    /// The charges held in the factorised frozen matrix, where it depends on nothing else; empty where it does.
+    factored_held: Vec<bool>,
 }
+
+/// Factors serve for an α that differs by no more than this part: equal steps differ in their last digits.
+const SAME_ALPHA: f64 = 1e-12;
 
 impl<'a> Network<'a> {
     /// At time `t` of a run that ends at `stop`, all modes 0.
@@ -135,6 +140,7 @@ impl<'a> Network<'a> {
             dynamic: Matrix::new(&system.dynamic),
             frozen: Matrix::new(&system.frozen),
             factored_alpha: None,
+            factored_held: vec![],
         }
     }
 
@@ -418,7 +424,7 @@ impl<'a> Network<'a> {
 
     /// Fills and factorises W(α) with the derivatives of the last linearisation.
     pub fn factorise_dynamic(&mut self, alpha: f64) -> Result<(), Singular> {
-        if self.factored_alpha == Some(alpha) {
+        if self.factored_alpha.is_some_and(|known| (known - alpha).abs() <= SAME_ALPHA * alpha) {
             return Ok(());
         }
         let plan = &self.system.dynamic;
@@ -450,6 +456,12 @@ impl<'a> Network<'a> {
 
     /// Fills and factorises the frozen network. `held` says which charges keep their value; the others have w = 0.
     pub fn factorise_frozen(&mut self, held: &[bool]) -> Result<(), Singular> {
+        // An operating point is sought with values of its own on the diagonal.
+        let constant = self.groups.is_empty() && self.gmin == 0.0 && self.pins.is_empty();
+        if constant && !held.is_empty() && self.factored_held == held {
+            return Ok(());
+        }
+        self.factored_held.clear();
         let plan = &self.system.frozen;
         let values = &mut self.frozen.values;
         values.copy_from_slice(&plan.fixed);
@@ -487,7 +499,11 @@ impl<'a> Network<'a> {
                 }
             }
         }
-        self.frozen.factorise(plan, &mut self.statistics)
+        self.frozen.factorise(plan, &mut self.statistics)?;
+        if constant {
+            self.factored_held.extend_from_slice(held);
+        }
+        Ok(())
     }
 
     /// The one combination of these rows of the frozen matrix that vanishes.
@@ -512,12 +528,13 @@ impl<'a> Network<'a> {
     pub fn forget_pivots(&mut self) {
         self.frozen.lu = None;
         self.dynamic.lu = None;
-        self.factored_alpha = None;
+        self.forget_constant_factors();
     }
 
     /// Forgets that the factors at hand are of the present matrix.
     pub fn forget_constant_factors(&mut self) {
         self.factored_alpha = None;
+        self.factored_held.clear();
     }
 
     /// Guards of the modes, two values each.

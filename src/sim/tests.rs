@@ -322,6 +322,7 @@ fn orders_of_convergence_with_a_charge_that_is_not_linear() {
             into: vec![(UnknownId(0), -1.0)],
             junction: None,
         }],
+        outputs: vec![("v(1)".into(), v())],
         ..Stamps::default()
     };
     let system = compile(&stamps, &mut vec![]).unwrap();
