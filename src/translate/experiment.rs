@@ -236,7 +236,7 @@ impl Builder<'_> {
 }
 
 /// Whether ngspice computes an expression in a `.param` as we do: sums, products, fractions and the plainest functions.
-pub(super) fn portable(expr: &GraphExpr) -> bool {
+pub fn portable(expr: &GraphExpr) -> bool {
     match &*expr.node {
         Node::Number(value) => value.is_finite(),
         Node::Leaf(_) => true,

@@ -35,6 +35,7 @@ mod tests;
 #[cfg(test)]
 mod loop_tests;
 
+pub use experiment::portable;
 pub use map::{Figures, Map};
 
 use crate::bond::causality::Causality;

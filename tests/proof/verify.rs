@@ -196,3 +196,100 @@ fn a_balance_with_a_sum_that_is_no_number_does_not_hold() {
     assert!(balance.holds());
     assert!(!bondspice::verify::EnergyReport { stored: f64::NAN, ..balance }.holds());
 }
+
+/// The command's own report, and its exit code.
+fn command(folder: &Path, arguments: &[&str]) -> (i32, serde_json::Value, String) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_bondspice"))
+        .arg("verify")
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).to_string();
+    let report = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    (output.status.code().unwrap(), report, said)
+}
+
+/// The keys that scripts rely on; more may stand beside them.
+const AGREED: [(&str, &[&str]); 4] = [
+    ("", &["schema", "verdict", "exact", "laws", "values", "trajectories", "energy"]),
+    ("/exact", &["verdict", "draws", "unknowns", "probability", "mismatches"]),
+    ("/trajectories/0", &["name", "max", "rms", "at"]),
+    ("/energy", &["in", "stored", "dissipated", "modulated", "residual"]),
+];
+
+const MOTOR: &str = "model Motor(R = 1 Ohm, L = 2 mH, k = 0.3 V*s) {\n  port in a : electrical\n  port out b : rotation\n  \
+                     a -> 1:arm -> GY:k -> 1:rotor -> b\n  arm -> R:R, I:L\n  rotor -> R:f(0.1 N*m*s)\n}\n\
+                     Se:U(9 V) -> Motor:m(R = 2 Ohm) -> I:J(0.2 kg*m^2)\n\
+                     simulate until 1 s step 10 ms\nobserve f(m.arm), f(m.rotor)\n";
+
+#[test]
+fn the_command_reports_and_exits_as_agreed() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("motor.bg", MOTOR);
+    let run = |arguments: &[&str]| command(folder.path(), arguments);
+    let json = |arguments: &[&str]| run(&[&["motor.bg", "--format", "json"], arguments].concat());
+    for dialect in ["ngspice", "xyce", "ltspice", "gnucap"] {
+        let (code, report, said) = json(&["--to", dialect]);
+        assert_eq!((code, said.as_str()), (0, ""), "{dialect}");
+        assert_eq!((&report["schema"], &report["verdict"]), (&1.into(), &"pass".into()));
+        for (part, keys) in AGREED {
+            let object = report.pointer(part).unwrap().as_object().unwrap();
+            for key in keys {
+                assert!(object.contains_key(*key), "{dialect}: {part}/{key}");
+            }
+        }
+        assert_eq!(report["trajectories"].as_array().unwrap().len(), 2);
+        assert!(report["exact"]["probability"].as_f64().unwrap() < 1e-16);
+        assert_eq!(report["exact"]["mismatches"].as_array().unwrap().len(), 0);
+    }
+    assert_eq!(json(&["--scale", "electrical=3,rotation=7"]).0, 0);
+    // A text that somebody edited, in a dialect that spells its map otherwise, too.
+    for dialect in ["ngspice", "xyce", "ltspice"] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_bondspice"))
+            .args(["convert", "motor.bg", "--to", dialect, "-o", "motor.cir", "--map", "map.json"])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let text = std::fs::read_to_string(folder.path().join("motor.cir")).unwrap();
+        let given = ["--netlist", "motor.cir", "--dialect", dialect, "--map", "map.json"];
+        assert_eq!(json(&given).0, 0, "{dialect}: {:?}", json(&given));
+        let changed = text.replace("Motor PARAMS: R=2", "Motor PARAMS: R=3");
+        assert_ne!(text, changed, "{text}");
+        write("motor.cir", &changed);
+        let (code, report, _) = json(&given);
+        assert_eq!((code, &report["verdict"]), (1, &"fail".into()), "{dialect}: {report:#}");
+        assert_eq!(report["values"]["mismatches"][0]["variable"], ".param X_m.R", "{report:#}");
+        assert!(
+            report["trajectories"].as_array().unwrap().is_empty() && report["energy"].is_null()
+        );
+        write("motor.cir", &text.replace("R_R ", "R_R 0 "));
+        assert_ne!(json(&given).0, 0);
+        // A card moved: the first variable that differs, and the card.
+        let line = text.lines().find(|line| line.starts_with("R_R ")).unwrap();
+        let mut moved: Vec<&str> = line.split_whitespace().collect();
+        moved[2] = if moved[2] == "a_m" { "a_p" } else { "a_m" };
+        write("motor.cir", &text.replace(line, &moved.join(" ")));
+        let (code, report, _) = json(&given);
+        assert_eq!(code, 1, "{dialect}: {report:#}");
+        let first = &report["exact"]["mismatches"][0];
+        assert!(!first["variable"].as_str().unwrap().is_empty(), "{first}");
+        assert_eq!(first["card"].as_str().unwrap().to_lowercase(), "motor.r_r", "{first}");
+    }
+    // A usage that is none, input that is none, a run that does not end, a file that is not there.
+    assert_eq!(run(&["motor.bg", "--format", "yaml"]).0, 2);
+    write("broken.bg", "Se:U(9 V) -> 1:m\nm -> R:r\n");
+    assert_eq!(run(&["broken.bg"]).0, 3);
+    write("motor.cir", "no netlist\nR1 a b\n.end\n");
+    assert_eq!(run(&["motor.bg", "--netlist", "motor.cir"]).0, 3);
+    write("map.json", "{\"variables\": 3}");
+    let (code, _, said) = run(&["motor.bg", "--netlist", "motor.cir", "--map", "map.json"]);
+    assert_eq!(code, 3, "{said}");
+    let blows_up = "Se:U(1 V) -> 1:m -> I:L(1 H)\nm -> R:r(e = -(1 Ohm/A)*f^2)\nsimulate until 10 s step 0.1 s\nobserve f(m)\n";
+    write("blows_up.bg", blows_up);
+    let (code, _, said) = run(&["blows_up.bg"]);
+    assert_eq!(code, 4, "{said}");
+    assert_eq!(run(&["nowhere.bg"]).0, 5);
+}

@@ -3,6 +3,8 @@
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::pipeline;
 use bondspice::diagnostic::Severity;
+use bondspice::netlist::dialects::NGSPICE;
+use bondspice::netlist::write::write;
 use bondspice::source::SourceMap;
 use std::path::{Path, PathBuf};
 
@@ -123,6 +125,33 @@ fn decks_run() {
     }
     assert!(trouble.is_empty(), "{}", trouble.join("\n"));
     assert!(run >= 2 && wrong >= 1, "{run} decks, {wrong} wrong ones");
+}
+
+/// What a page shows of a netlist stands in that of the bond graph before it, line by line.
+#[test]
+fn netlists_are_those_of_their_examples() {
+    let (mut bond, mut shown) = (None, 0);
+    for example in examples() {
+        match example.says.as_str() {
+            "bg" => bond = Some(example.text),
+            "netlist" => {
+                let mut map = SourceMap::default();
+                let file = map.add("cells.bg", bond.clone().unwrap());
+                let mut d = vec![];
+                let model = pipeline::model(&mut map, file, &Overrides::default(), &mut d);
+                let (netlist, _) = model.unwrap().netlist(&map, &NGSPICE, false);
+                let text = write(&netlist);
+                let mut lines = text.lines();
+                for line in example.text.lines().filter(|line| *line != "...") {
+                    let found = lines.any(|own| own == line);
+                    assert!(found, "{}: `{line}` is not in\n{text}", example.place);
+                }
+                shown += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(shown >= 1);
 }
 
 #[test]

@@ -76,6 +76,9 @@ pub fn options(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
             }
             (flag.to_lowercase(), "1".to_string())
         };
+        if is_always_written(reader, package.as_deref(), &key, &value) {
+            continue;
+        }
         let Some(package) = &package else {
             options.push((key, value));
             continue;
@@ -115,6 +118,15 @@ fn value(reader: &mut Reader, cursor: &mut Cursor) -> Option<String> {
             crate::netlist::plain(number.value)
         }
         _ => word.to_lowercase(),
+    })
+}
+
+/// Whether an option is one of those that a netlist in this dialect has whatever it says: its simulator's business.
+fn is_always_written(reader: &Reader, package: Option<&str>, key: &str, value: &str) -> bool {
+    let (of, own) = reader.dialect.options;
+    let mut own = own.iter().filter_map(|option| option.split_once('='));
+    own.any(|(name, always)| {
+        of == package && name == key && always.parse::<f64>().ok() == value.parse().ok()
     })
 }
 

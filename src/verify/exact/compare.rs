@@ -13,6 +13,7 @@ use crate::circuit::{DeviceKind, Leaf as CircuitLeaf};
 use crate::expr::Node;
 use crate::netlist::flatten::scope::TOP;
 use crate::netlist::{Element, Expr};
+use crate::translate::portable;
 use crate::verify::report::Mismatch;
 use std::collections::HashMap;
 
@@ -121,13 +122,23 @@ fn parameters<F: Modular>(
         if others == 0 {
             continue;
         }
-        if let Some(written) = wires.written_parameter(ParameterId(k as u32))? {
-            drawn.variables += 1;
-            if Some(&written) != bonds.parameters.get(k) {
-                let why = "it is computed otherwise than in the bond graph";
-                drawn.mismatches.push(Mismatch::of(&parameter.name, why));
+        let written = wires.written_parameter(ParameterId(k as u32))?;
+        let known = wires.text.parameters.get(k).is_some_and(Option::is_some);
+        let why = match written {
+            Some(written) if Some(&written) != bonds.parameters.get(k) => {
+                "it is computed otherwise than in the bond graph"
             }
-        }
+            // What other simulators cannot compute stands as a number.
+            None if known && portable(&parameter.expr) => {
+                "it is a number, where the bond graph computes it from others"
+            }
+            _ => {
+                drawn.variables += usize::from(written.is_some());
+                continue;
+            }
+        };
+        drawn.variables += 1;
+        drawn.mismatches.push(Mismatch::of(&parameter.name, why));
     }
     Ok(())
 }
