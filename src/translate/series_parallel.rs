@@ -253,7 +253,7 @@ impl Drawing {
     }
 
     /// The place of a bond among its junction's: sources first, loads last, and 0-junctions at the ends of a loop,
-    /// where their return meets ground; of equals those of the junction's own model in the middle, so that they stand
+    /// where their return meets ground; of elements those of the junction's own model in the middle, so that they stand
     /// between its ports.
     pub(super) fn place(&self, graph: &BondGraph, bond: BondId, junction: VertexId) -> (u32, bool) {
         let far = other_end(graph, bond, junction_end(junction));
@@ -276,6 +276,6 @@ impl Drawing {
             (Law::One, false) => 6,
             (_, false) => 5,
         };
-        (place, own == inward)
+        (place, matches!(place, 3 | 5) && own == inward)
     }
 }
