@@ -83,9 +83,7 @@ S2 0 sw 0 g SWN
 
 /// ngspice's trace of a deck; `None` where ngspice is not installed and need not be.
 fn ngspice(deck: &str) -> Option<Trace> {
-    if Command::new("ngspice").arg("--version").output().is_err() {
-        assert!(std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_none(), "ngspice is missing");
-        eprintln!("SKIPPED: ngspice is not installed");
+    if !crate::peers::has("ngspice") {
         return None;
     }
     let folder = tempfile::tempdir().unwrap();

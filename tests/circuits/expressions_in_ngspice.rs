@@ -108,19 +108,9 @@ fn cases() -> Vec<Tree> {
     cases
 }
 
-/// Whether ngspice is here. A missing one fails the test where peers are required.
-fn ngspice() -> bool {
-    if Command::new("ngspice").arg("--version").output().is_ok() {
-        return true;
-    }
-    assert!(std::env::var_os("BONDSPICE_REQUIRE_PEERS").is_none(), "ngspice is missing");
-    eprintln!("SKIPPED: ngspice is not installed");
-    false
-}
-
 #[test]
 fn printed_expressions_mean_the_same_in_ngspice() {
-    if !ngspice() {
+    if !crate::peers::has("ngspice") {
         return;
     }
     let cases = cases();

@@ -44,8 +44,11 @@ fn at(folder: &Path, name: &str) -> String {
 
 /// The operating point of ngspice, or `None` where it is not installed.
 fn ngspice(path: &str) -> Option<BTreeMap<String, f64>> {
+    if !crate::peers::has("ngspice") {
+        return None;
+    }
     let raw = format!("{path}.raw");
-    Command::new("ngspice").args(["-b", "-r", &raw, path]).output().ok()?;
+    Command::new("ngspice").args(["-b", "-r", &raw, path]).output().unwrap();
     let bytes = std::fs::read(&raw).unwrap_or_else(|_| panic!("ngspice ran {path} to no result"));
     let trace = bondspice::trace::formats::read(&raw, &bytes).unwrap();
     let last = trace.columns.iter().map(|column| *column.last().unwrap());

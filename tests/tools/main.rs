@@ -1,5 +1,8 @@
 //! The command line, the language server, messages, documentation, and the order of the house.
 
+#[path = "../peers/mod.rs"]
+mod peers;
+
 mod cli;
 mod lsp;
 mod examples;

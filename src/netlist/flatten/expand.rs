@@ -1,5 +1,6 @@
 //! The first pass: scopes, nodes and numbered devices.
 
+use super::copies::{COPIES, Joint};
 use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
 use super::sources::Times;
 use super::values::near;
@@ -140,10 +141,10 @@ fn stated(netlist: &Netlist, variation: &Variation, key: &str) -> Option<f64> {
     values.map(|read| read.value).reduce(|_, last| last)
 }
 
-struct Expander<'n> {
-    flat: Flat<'n>,
+pub(super) struct Expander<'n> {
+    pub(super) flat: Flat<'n>,
     variation: &'n Variation,
-    ground: Option<Name>,
+    pub(super) ground: Option<Name>,
     /// The subcircuits that are being expanded, outermost first.
     chain: Vec<&'n Subcircuit>,
     /// How many of them stand for several in parallel.
@@ -519,90 +520,6 @@ impl<'n> Expander<'n> {
         self.body(inner, &live, d);
         self.several -= usize::from(several.is_some());
         self.chain.pop();
-    }
-
-    /// What an instance that stands for several takes up at a global node is not known from its terminals.
-    fn refuse_globals(&self, id: ScopeId, card: &Card, device: &Device, d: &mut Vec<Diagnostic>) {
-        let scope = self.flat.scopes.get(id);
-        let inside = |name: &Name| scope.nodes.get(name).is_some_and(|node| node.0 != 0);
-        let global = |name: &&Name| {
-            self.flat.scopes.globals.contains_key(name)
-                && Some(**name) != self.ground
-                && !inside(name)
-        };
-        let Some(name) = device.nodes.iter().find(global) else { return };
-        let text = self.flat.netlist.names.text(*name);
-        let message = format!("`{text}` is global, and several instances stand here (`m=`)");
-        let error = Diagnostic::error("E0775", card.span, message)
-            .because("what they take up there cannot be told")
-            .help(format!("make `{text}` a terminal of the subcircuit"));
-        if d.len() < 1000 && !d.contains(&error) {
-            d.push(error);
-        }
-    }
-
-    /// How many copies of a subcircuit an instance is, where `m=` says another number than 1 and is no parameter of it.
-    fn copies(
-        &self,
-        id: ScopeId,
-        card: &Card,
-        subcircuit: &Subcircuit,
-        parameters: &[(Name, Expr)],
-        d: &mut Vec<Diagnostic>,
-    ) -> Option<f64> {
-        let names = &self.flat.netlist.names;
-        let own = |name: &Name| names.text(*name).eq_ignore_ascii_case(COPIES);
-        let (name, expr) = parameters.iter().find(|(name, _)| own(name))?;
-        if subcircuit.parameters.iter().any(|(own, _)| own == name) {
-            return None;
-        }
-        let copies = scope::number(&self.flat.scopes, id, expr, names, d)?;
-        if !(copies > 0.0 && copies.is_finite()) {
-            let message = format!("`m={copies}` is no number of instances");
-            d.push(Diagnostic::error("E0775", card.span, message).help("it is above 0"));
-            return None;
-        }
-        (copies != 1.0).then_some(copies)
-    }
-}
-
-/// The key of an X card that says how many instances stand in parallel.
-const COPIES: &str = "m";
-
-/// A terminal of an instance that stands for several in parallel: what it takes up is taken up as often.
-pub struct Joint<'n> {
-    /// The instance and its terminal.
-    pub name: String,
-    /// Outside, and within the one instance that is there.
-    pub nodes: [NodeId; 2],
-    /// How many there are.
-    pub copies: f64,
-    /// The instance.
-    pub card: &'n Card,
-}
-
-impl Flat<'_> {
-    /// Makes devices of the joints: a source of 0 V senses the current of one instance, and what the others take up flows
-    /// to the ground, where all that enters an instance leaves it in the end.
-    pub fn join(&self) {
-        for joint in &self.joints {
-            let mut made = self.quantities.borrow_mut();
-            let sense = DeviceId((self.devices.len() + made.len()) as u32);
-            let [outer, inner] = joint.nodes;
-            let constant = circuit::Waveform::Constant(0.0);
-            let device = |name: String, nodes, kind| circuit::Device {
-                name,
-                nodes,
-                kind,
-                nominal: None,
-                span: joint.card.span,
-            };
-            let parts = circuit::Parts::default();
-            let kind = circuit::DeviceKind::VoltageSource { waveform: constant, parts };
-            made.push(device(joint.name.clone(), vec![outer, inner], kind));
-            let kind = circuit::DeviceKind::Cccs { gain: joint.copies - 1.0, control: sense };
-            made.push(device(format!("{}#others", joint.name), vec![outer, NodeId(0)], kind));
-        }
     }
 }
 

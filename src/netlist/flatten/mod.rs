@@ -5,6 +5,7 @@
 
 pub mod scope;
 pub mod expand;
+mod copies;
 pub mod values;
 mod kinds;
 mod models;
