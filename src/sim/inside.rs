@@ -70,7 +70,7 @@ impl Inside {
         work: &mut Work,
     ) -> Result<(), Stopped> {
         let theta = (time - from.t) / (to.t - from.t);
-        if index2 {
+        if index2 && !work.dense.by_unknowns {
             return self.shorter_step(network, from, to, time, weights, work);
         }
         let rough = *self.rough.get_or_insert_with(|| is_rough(network, from, to, weights, work));
@@ -85,6 +85,13 @@ impl Inside {
             *w = from.w[k] + theta * (to.w[k] - from.w[k]);
         }
         self.point.t = time;
+        if index2 {
+            // Not every unknown follows from the charges: the parabola through the stages stands, where it may.
+            return match rough {
+                true => self.shorter_step(network, from, to, time, weights, work),
+                false => Ok(()),
+            };
+        }
         if rough && self.step_to_point(network, from, theta, weights, work) {
             return Ok(());
         }
