@@ -253,18 +253,14 @@ impl Drawing {
     }
 
     /// The place of a bond among its junction's: sources first, loads last, and 0-junctions at the ends of a loop,
-    /// where their return meets ground; of elements those of the junction's own model in the middle, so that they stand
-    /// between its ports.
-    pub(super) fn place(&self, graph: &BondGraph, bond: BondId, junction: VertexId) -> (u32, bool) {
+    /// where their return meets ground.
+    pub(super) fn place(&self, graph: &BondGraph, bond: BondId, junction: VertexId) -> u32 {
         let far = other_end(graph, bond, junction_end(junction));
         let vertex = graph.vertex(far.vertex);
         let inward = graph.bond(bond).to.vertex == junction;
         let source = matches!(vertex.law, Law::Source { sets: Power::Effort, detector: false, .. });
         let two_port = matches!(vertex.law, Law::Transformer(_) | Law::Gyrator(_));
-        let model =
-            |vertex: VertexId| graph.vertex(vertex).name.rsplit_once('.').map(|(path, _)| path);
-        let own = model(far.vertex) == model(junction);
-        let place = match (&vertex.law, inward) {
+        match (&vertex.law, inward) {
             (Law::Zero, true) => 0,
             (_, true) if source => 1,
             (_, true) if two_port => 2,
@@ -275,7 +271,6 @@ impl Drawing {
             (_, false) if source => 7,
             (Law::One, false) => 6,
             (_, false) => 5,
-        };
-        (place, matches!(place, 3 | 5) && own == inward)
+        }
     }
 }

@@ -78,8 +78,8 @@ fn a_model_is_the_graph_that_it_holds() {
     ));
     let flat = run(&format!(
         "param L = 1.2 mH; param R = 0.1 Ohm; param Phi = 0.5 V*s\n\
-         Se:U(270 V) -> 1:armature -> GY:Phi -> 1:rotor\n\
-         armature -> I:L, R:R\nrotor -> I:Jmp(2e-3 kg*m^2), R:fmp(1e-3 N*m*s), R:load(0.05 N*m*s)\n\
+         Se:U(270 V) -> 1:armature -> GY:Phi -> 1:rotor -> R:load(0.05 N*m*s)\n\
+         armature -> I:L, R:R\nrotor -> I:Jmp(2e-3 kg*m^2), R:fmp(1e-3 N*m*s)\n\
          signal i = f(armature)\n{run_line}\
          observe f(rotor), e(U), f(rotor -> load), power(rotor -> load), i, p(L)\n"
     ));

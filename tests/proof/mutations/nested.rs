@@ -133,9 +133,14 @@ impl Deck {
             (None, Some(b)) if a == "0" => (b, None),
             _ => return false,
         };
-        let own = self.instances();
+        let (own, blocks) = (self.instances(), self.blocks());
         let mut own = own.iter().filter(|x| x.words[terminals(&x.words).end] == block.head[1]);
-        own.all(|x| x.words[1 + a] == b.map_or("0", |b| x.words[1 + b].as_str()))
+        own.all(|x| {
+            let (a, b) = (&x.words[1 + a], b.map_or("0", |b| x.words[1 + b].as_str()));
+            // They may be terminals of what is around.
+            let around = blocks.iter().find(|block| block.body == x.around);
+            a == b || around.is_some_and(|around| self.one_node(around, a, b))
+        })
     }
 
     fn swapped_terminals(&self, random: &mut Random) -> Option<Change> {
