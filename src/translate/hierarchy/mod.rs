@@ -34,7 +34,7 @@ use bodies::Lift;
 use naming::Naming;
 use parts::Part;
 use ports::Blocks;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use tree::Tree;
 use variants::{Body, Definitions, Public};
 use words::Words;
@@ -245,13 +245,9 @@ impl Writer<'_> {
             }
         }
         // Those of instances that stand inlined here, too.
-        for at in 0..self.graph.parameters.len() {
-            let name = self.flat.map.parameters[at].0;
-            let own = instance.parameters.iter().any(|parameter| parameter.id.index() == at);
-            if self.naming.owners.get(&name) == Some(&scope) && !own {
-                private.push(at);
-            }
-        }
+        let own: HashSet<usize> = instance.parameters.iter().map(|own| own.id.index()).collect();
+        let inlined = self.naming.owned[scope as usize].iter();
+        private.extend(inlined.filter(|at| !own.contains(at)));
         let mut cards = self.private(scope, private, names, &mut lifts);
         let power = local.parts.iter().filter(|at| self.parts[**at].power);
         cards.extend(power.map(|at| self.own_card(scope, *at, names, &mut lifts)));
@@ -424,9 +420,7 @@ impl Writer<'_> {
     ) -> Vec<Card> {
         let local = &self.naming.locals[0];
         let (mut cards, mut none) = (vec![], vec![]);
-        let own = (0..self.graph.parameters.len())
-            .filter(|at| self.naming.owners.get(&self.flat.map.parameters[*at].0) == Some(&0));
-        let own = self.private(0, own.collect(), names, &mut none);
+        let own = self.private(0, self.naming.owned[0].clone(), names, &mut none);
         if !own.is_empty() {
             cards.push(comment(" parameters, in SI units"));
         }

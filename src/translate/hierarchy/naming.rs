@@ -53,6 +53,8 @@ pub struct Naming<'f> {
     pub places: HashMap<Name, u32>,
     /// By parameter: its subcircuit.
     pub owners: HashMap<Name, u32>,
+    /// By instance: the parameters, by their index, whose subcircuit it is.
+    pub owned: Vec<Vec<usize>>,
 }
 
 impl<'f> Naming<'f> {
@@ -77,6 +79,7 @@ impl<'f> Naming<'f> {
             meets: HashMap::new(),
             places: HashMap::new(),
             owners: HashMap::new(),
+            owned: vec![vec![]; tree.instances.len()],
         };
         let scopes: Vec<u32> =
             (0..tree.instances.len() as u32).filter(|k| tree.scope(*k) == *k).collect();
@@ -102,23 +105,23 @@ impl<'f> Naming<'f> {
     /// Parameters, in the order of the file, those of the file itself first.
     fn name_parameters(&mut self, tree: &Tree, parts: &[Part]) {
         let flat: Vec<Name> = self.flat.map.parameters.iter().map(|(name, _)| *name).collect();
-        for (name, instance) in flat.iter().zip(parameter_homes(self.graph, tree)) {
-            self.owners.insert(*name, tree.scope(instance));
+        for (at, instance) in parameter_homes(self.graph, tree).into_iter().enumerate() {
+            let scope = tree.scope(instance);
+            self.owners.insert(flat[at], scope);
+            self.owned[scope as usize].push(at);
         }
         for scope in 0..self.locals.len() as u32 {
             if scope > 0 {
                 self.reserve(scope, parts);
             }
             let prefix = prefix(tree, scope);
-            for (name, parameter) in flat.iter().zip(&self.graph.parameters) {
-                if self.owners[name] != scope {
-                    continue;
-                }
+            let local = &mut self.locals[scope as usize];
+            for at in &self.owned[scope as usize] {
+                let parameter = &self.graph.parameters[*at];
                 let wish = &parameter.name[common_part(&parameter.name, &prefix).len()..];
-                let local = &mut self.locals[scope as usize];
                 let own = local.namer.parameter(wish);
                 let text = local.namer.names.text(own).to_string();
-                local.parameters.insert(*name, text);
+                local.parameters.insert(flat[*at], text);
             }
         }
     }

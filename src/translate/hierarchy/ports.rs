@@ -26,6 +26,11 @@ pub struct Blocks {
     head: Vec<usize>,
     /// By head: the instances of its cards, and the nodes between which they stand.
     edges: HashMap<usize, Vec<(u32, [Name; 2])>>,
+    /// By head and node: how many ends of cards stand there.
+    ends: HashMap<(usize, Name), usize>,
+    /// By instance: the heads and nodes of its own cards, and the instances in it.
+    own: Vec<Vec<(usize, [Name; 2])>>,
+    inner: Vec<Vec<u32>>,
     /// By instance: the blocks that its cards, and those of instances in it, stand in.
     touched: Vec<BTreeSet<usize>>,
 }
@@ -51,21 +56,28 @@ impl Blocks {
         let head: Vec<usize> = (0..names.len()).map(|node| forest.root(node)).collect();
         let mut edges: HashMap<usize, Vec<(u32, [Name; 2])>> = HashMap::new();
         let mut touched = vec![BTreeSet::new(); instances.len()];
+        let mut ends: HashMap<(usize, Name), usize> = HashMap::new();
+        let mut own = vec![vec![]; instances.len()];
+        let mut inner = vec![vec![]; instances.len()];
         for part in parts.iter().filter(|part| part.power) {
             for pair in &part.edges {
                 if let Some(node) = pair.iter().find(|node| **node != ground) {
                     let head = head[node.0 as usize];
                     edges.entry(head).or_default().push((part.mark.home, *pair));
                     touched[part.mark.home as usize].insert(head);
+                    own[part.mark.home as usize].push((head, *pair));
+                    pair.iter().for_each(|node| *ends.entry((head, *node)).or_default() += 1);
                 }
             }
         }
         // Those inside stand behind those around them.
         for at in (1..instances.len()).rev() {
-            let inner = touched[at].clone();
-            touched[instances[at].parent.unwrap_or(0) as usize].extend(inner);
+            let parent = instances[at].parent.unwrap_or(0) as usize;
+            let own = touched[at].clone();
+            touched[parent].extend(own);
+            inner[parent].push(at as u32);
         }
-        Blocks { ground, head, edges, touched }
+        Blocks { ground, head, edges, ends, own, inner, touched }
     }
 
     /// The block of some nodes; `None` when all of them are ground.
@@ -110,13 +122,7 @@ impl Blocks {
         ports: &[&Port],
         names: &Names,
     ) -> Option<String> {
-        let edges = self.edges.get(&block)?;
-        let (inner, outer): (Vec<_>, Vec<_>) =
-            edges.iter().partition(|(home, _)| tree.stands_in(*home, instance));
-        let [inner, outer] = [inner, outer].map(Side::of);
-        let mut boundary: Vec<Name> =
-            inner.place.keys().copied().filter(|node| outer.place.contains_key(node)).collect();
-        boundary.sort_unstable();
+        let boundary = self.boundary(block, instance);
         let terminals: HashSet<Name> = ports.iter().flat_map(|port| port.nodes).collect();
         if let Some(node) = boundary.iter().find(|node| !terminals.contains(node)) {
             let node = if *node == self.ground { "ground" } else { names.text(*node) };
@@ -137,10 +143,38 @@ impl Blocks {
         }
         // The sum of all is zero, so that the last needs no proof.
         let (_, others) = groups.split_last()?;
+        if others.is_empty() {
+            return None;
+        }
+        let (inner, outer): (Vec<_>, Vec<_>) =
+            (self.edges.get(&block)?.iter()).partition(|(home, _)| tree.stands_in(*home, instance));
+        let [inner, outer] = [inner, outer].map(Side::of);
         let unsound = others.iter().find(|group| !is_cut(&inner, &outer, &boundary, group))?;
         let port = ports.iter().find(|port| unsound.contains(&port.nodes[0]));
         let name = port.map_or("", |port| port.name.as_str());
         Some(format!("what enters its port {name} at + need not leave it at −"))
+    }
+}
+
+impl Blocks {
+    /// The nodes of a block at which both cards of an instance, or in it, and others stand.
+    fn boundary(&self, block: usize, instance: u32) -> Vec<Name> {
+        let mut own: HashMap<Name, usize> = HashMap::new();
+        let mut waiting = vec![instance];
+        while let Some(at) = waiting.pop() {
+            for (head, pair) in &self.own[at as usize] {
+                if *head == block {
+                    pair.iter().for_each(|node| *own.entry(*node).or_default() += 1);
+                }
+            }
+            waiting.extend(&self.inner[at as usize]);
+        }
+        let shared = |(node, own): (Name, usize)| {
+            self.ends.get(&(block, node)).is_some_and(|all| *all > own).then_some(node)
+        };
+        let mut boundary: Vec<Name> = own.into_iter().filter_map(shared).collect();
+        boundary.sort_unstable();
+        boundary
     }
 }
 
