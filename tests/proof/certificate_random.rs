@@ -247,3 +247,16 @@ fn random_graphs_are_proven_or_told_by_name_3() {
 fn random_graphs_are_proven_or_told_by_name_4() {
     part(3);
 }
+
+/// Graphs of longer searches that were once refused, though their texts are right: two sources of one law in one sum, a
+/// quotient of zeros, a law that is 0 beside other zeros, a part of a law that happens to have another law's value.
+#[test]
+fn graphs_that_were_refused_once_are_proven() {
+    for seed in [455, 162_853, 9715, 112_174] {
+        match fate(seed) {
+            Fate::Proven(_) => {}
+            Fate::Told(code) => panic!("seed {seed}: {code}"),
+            Fate::Wrong(why) => panic!("{why}"),
+        }
+    }
+}

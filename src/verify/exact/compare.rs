@@ -5,6 +5,7 @@ use super::draw::{Draw, Modular, decimal};
 use super::floats::Sides;
 use super::form::Trouble;
 use super::text::{Text, port_name};
+use super::uncut::{self, Uncut};
 use super::wires::Wires;
 use crate::bond::graph::{
     BondGraph, BondId, Law, Memory, ParameterId, Power, SignalLaw, SignalOrigin, Storage,
@@ -28,6 +29,8 @@ pub struct Drawn {
     pub variables: usize,
     /// Laws and signals that were cut and compared.
     pub laws: usize,
+    /// How often any of them was tried once more, with some of the laws that stand in it left as they are.
+    pub tries: usize,
     /// Variables that differ.
     pub mismatches: Vec<Mismatch>,
     /// Laws whose text or arguments differ.
@@ -165,7 +168,7 @@ fn variables<F: Modular>(
                 continue;
             }
         };
-        if !equals(sides, expr, value, cut)? {
+        if !equals(sides, expr, value, cut, &mut drawn.tries)? {
             drawn.mismatches.push(Mismatch::of(&variable.bg, "it differs"));
         }
     }
@@ -178,16 +181,17 @@ fn equals<F: Modular>(
     expr: &Expr,
     value: F,
     cut: &[HashMap<u64, F>],
+    tries: &mut usize,
 ) -> Result<bool, Nothing> {
-    for cut in std::iter::once(None).chain(cut.iter().map(Some)) {
-        match sides.wires.value(TOP, expr, sides.ours, cut) {
-            Ok(found) if found == value => return Ok(true),
-            Ok(_) => {}
-            Err(Trouble::Zero) => return Err(Nothing::Zero),
-            Err(_) => return Ok(false),
-        }
+    let mut found = || {
+        let value_of = |cut: Option<&Uncut<F>>| sides.wires.value(TOP, expr, sides.ours, cut);
+        Ok(value_of(None)? == value
+            || uncut::has(cut, value, tries, &mut |cut| value_of(Some(cut)))?)
+    };
+    match found() {
+        Err(Trouble::Zero) => Err(Nothing::Zero),
+        found => Ok(found.unwrap_or(false)),
     }
-    Ok(false)
 }
 
 const POWERS: [(char, Power); 2] = [('e', Power::Effort), ('f', Power::Flow)];
@@ -309,10 +313,11 @@ fn columns<F: Modular>(
                 .clone()
                 .binary(crate::expr::Binary::Divide, crate::expr::Expr::number(factor)),
         };
-        let value = bonds.value(&observation.expr, None, sides.theirs, None)? / factor;
+        let value = bonds.value(&observation.expr, None, sides.theirs)? / factor;
         let holds = match read {
             Some(read) => {
-                equals(sides, read, value, cut)? || sides.same(&law, None, false, TOP, read)
+                equals(sides, read, value, cut, &mut drawn.tries)?
+                    || sides.same(&law, None, false, TOP, read)
             }
             None => false,
         };
@@ -344,17 +349,16 @@ fn laws<F: Modular>(
             continue;
         };
         drawn.laws += 1;
-        let theirs = bonds.value(&cut.law, cut.own, sides.theirs, None)?;
+        let theirs = bonds.value(&cut.law, cut.own, sides.theirs)?;
         let theirs = if card.turned { -theirs } else { theirs };
         let raw = wires.value(pending.scope, law, sides.ours, None)?;
         if raw == theirs {
             continue;
         }
         let own = wires.own_value(card.device, sides.ours);
-        let mut replaced = false;
-        for cut in cut_values {
-            replaced |= wires.value(pending.scope, law, sides.ours, Some(cut))? == own;
-        }
+        let replaced = uncut::has(cut_values, own, &mut drawn.tries, &mut |cut| {
+            wires.value(pending.scope, law, sides.ours, Some(cut))
+        })?;
         if replaced || sides.same(&cut.law, cut.own, card.turned, pending.scope, law) {
             continue;
         }
@@ -388,7 +392,7 @@ fn memories<F: Modular>(sides: &Sides<F>, drawn: &mut Drawn) -> Result<(), Nothi
         drawn.laws += 1;
         let input = match bonds.cuts.get(&Place::Signal(id)) {
             Some(cut) => cut.value.at(sides.theirs),
-            None => bonds.value(input, None, sides.theirs, None)?,
+            None => bonds.value(input, None, sides.theirs)?,
         };
         let fits = matches!(
             (kind, &own.kind),

@@ -1,10 +1,10 @@
 //! Affine forms: what an expression comes down to over a field, as long as it is linear in the unknowns.
 
 use super::draw::{Draw, Modular, decimal, square_root};
+use super::uncut::Uncut;
 use crate::expr::functions::{Slot, Spelling};
 use crate::expr::{Binary, Expr, Function, Node, Unary};
 use crate::source::Span;
-use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// c + Σ a·x
@@ -95,7 +95,7 @@ pub struct Reading<'a, F> {
     /// The draw, for functions that mean nothing in the field.
     pub draw: Draw,
     /// Values of laws and what they were cut to: where a part of the expression has such a value, it counts as the other.
-    pub cut: Option<&'a HashMap<u64, F>>,
+    pub cut: Option<&'a Uncut<'a, F>>,
 }
 
 /// What gives the form of a leaf.
@@ -149,11 +149,9 @@ impl<F: Modular> Reading<'_, F> {
     }
 
     fn uncut(&self, found: Form<F>) -> Form<F> {
-        let (Some(cut), Some(value)) = (self.cut, found.as_number()) else { return found };
-        match (cut.get(&value.value()), cut.get(&(-value).value())) {
-            (Some(to), _) => Form::number(*to),
-            (None, Some(to)) => Form::number(-*to),
-            (None, None) => found,
+        match (self.cut, found.as_number()) {
+            (Some(cut), Some(value)) => Form::number(cut.of(value)),
+            _ => found,
         }
     }
 

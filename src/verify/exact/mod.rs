@@ -5,6 +5,7 @@
 
 pub mod draw;
 pub mod form;
+pub mod uncut;
 pub mod system;
 pub mod bonds;
 pub mod text;
@@ -69,7 +70,7 @@ fn draws(first: &OneDraw<'_>, second: &OneDraw<'_>, seed: u64) -> (Exact, Laws) 
             match draw(Draw { seed }) {
                 Ok(drawn) => {
                     let size = drawn.unknowns.iter().sum::<usize>() as f64;
-                    let compared = (drawn.variables + drawn.laws) as f64;
+                    let compared = (drawn.variables + drawn.laws + drawn.tries) as f64;
                     exact.draws += 1;
                     exact.unknowns = drawn.unknowns.iter().sum();
                     exact.operations = drawn.operations;

@@ -36,8 +36,7 @@ pub fn draw<F: Modular>(
         let mut same = ours.signal(id).at(&x) == theirs.signal(id).at(&y);
         match (&signal.law, &scaled.signals[k].law) {
             (SignalLaw::Memory { input, .. }, SignalLaw::Memory { input: scaled, .. }) => {
-                same &=
-                    ours.value(input, None, &x, None)? == theirs.value(scaled, None, &y, None)?;
+                same &= ours.value(input, None, &x)? == theirs.value(scaled, None, &y)?;
             }
             (SignalLaw::Waveform(plain), SignalLaw::Waveform(scaled)) => {
                 same &= format!("{plain:?}") == format!("{scaled:?}")
@@ -51,8 +50,8 @@ pub fn draw<F: Modular>(
     }
     for (plain, scaled) in plain.experiment.observe.iter().zip(&scaled.experiment.observe) {
         drawn.variables += 1;
-        let is = theirs.value(&scaled.expr, None, &y, None)?;
-        if ours.value(&plain.expr, None, &x, None)? != is || plain.unit != scaled.unit {
+        let is = theirs.value(&scaled.expr, None, &y)?;
+        if ours.value(&plain.expr, None, &x)? != is || plain.unit != scaled.unit {
             differs(&mut drawn, &format!("column {}", plain.name));
         }
     }
@@ -63,8 +62,8 @@ pub fn draw<F: Modular>(
             differs_law(&mut drawn, plain, *place);
             continue;
         };
-        let is = theirs.value(&scaled.law, scaled.own, &y, None)?;
-        let should = ours.value(&cut.law, cut.own, &x, None)?;
+        let is = theirs.value(&scaled.law, scaled.own, &y)?;
+        let should = ours.value(&cut.law, cut.own, &x)?;
         if is * cut.offset != should * scaled.offset {
             differs_law(&mut drawn, plain, *place);
         }
@@ -72,8 +71,8 @@ pub fn draw<F: Modular>(
     for ((plain, own, number), (scaled, _, scaled_number)) in ours.moduli.iter().zip(&theirs.moduli)
     {
         drawn.laws += 1;
-        let is = theirs.value(scaled, Some(*own), &y, None)?;
-        let should = ours.value(plain, Some(*own), &x, None)?;
+        let is = theirs.value(scaled, Some(*own), &y)?;
+        let should = ours.value(plain, Some(*own), &x)?;
         if is * *number != should * *scaled_number {
             let name = &ours.graph.vertex(*own).name;
             drawn.wrong_laws.push(Mismatch::of(name, "its modulus is not the scaled one"));

@@ -12,14 +12,8 @@ impl<F: Modular> Bonds<'_, F> {
     ///
     /// # Errors
     /// Why it has none.
-    pub fn value(
-        &self,
-        expr: &Expr,
-        own: Option<VertexId>,
-        solution: &[F],
-        cut: Option<&HashMap<u64, F>>,
-    ) -> Result<F, Trouble> {
-        Reading { draw: self.draw, cut }
+    pub fn value(&self, expr: &Expr, own: Option<VertexId>, solution: &[F]) -> Result<F, Trouble> {
+        Reading { draw: self.draw, cut: None }
             .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(leaf, own)?.at(solution))))
     }
 
@@ -43,11 +37,11 @@ impl<F: Modular> Bonds<'_, F> {
                 Place::Signal(_) => false,
             };
             if !two_port {
-                alike.laws.insert(*place, self.value(&cut.law, cut.own, solution, None)?);
+                alike.laws.insert(*place, self.value(&cut.law, cut.own, solution)?);
             }
         }
         for (modulus, own, _) in &self.moduli {
-            alike.moduli.insert(*own, self.value(modulus, Some(*own), solution, None)?);
+            alike.moduli.insert(*own, self.value(modulus, Some(*own), solution)?);
         }
         for value in alike.laws.values().chain(alike.moduli.values()) {
             *count.entry(size(*value)).or_default() += 1;
@@ -59,20 +53,24 @@ impl<F: Modular> Bonds<'_, F> {
     }
 
     /// Of every law that is cut the value of its text, and what it was cut to. Laws of one text are cut to different
-    /// values: each has its own table.
+    /// values: each has its own table. So has a law whose text is 0, as the product with a flow that is forced to 0:
+    /// there are other zeros in an expression than this one.
     ///
     /// # Errors
     /// What has no value in this draw.
     pub fn cut_values(&self, solution: &[F]) -> Result<Vec<HashMap<u64, F>>, Trouble> {
         let mut pairs = vec![];
         for (modulus, own, number) in &self.moduli {
-            pairs.push((self.value(modulus, Some(*own), solution, None)?, *number));
+            pairs.push((self.value(modulus, Some(*own), solution)?, *number));
         }
         for cut in self.cuts.values() {
-            let value = self.value(&cut.law, cut.own, solution, None)?;
+            let value = self.value(&cut.law, cut.own, solution)?;
             pairs.push((value, cut.value.at(solution)));
         }
         pairs.sort_by_key(|(value, to)| (value.value(), to.value()));
+        pairs.dedup();
+        let zeros: Vec<F> =
+            pairs.extract_if(.., |(value, _)| value.is_zero()).map(|(_, to)| to).collect();
         let mut tables: Vec<HashMap<u64, F>> = vec![];
         for (value, to) in pairs {
             let key = value.value();
@@ -83,6 +81,18 @@ impl<F: Modular> Bonds<'_, F> {
                 None => tables.push(HashMap::from([(key, to)])),
             }
         }
+        if tables.is_empty() && !zeros.is_empty() {
+            tables.push(HashMap::new());
+        }
+        let with_zeros = zeros.iter().flat_map(|to| {
+            tables.iter().map(|table| {
+                let mut table = table.clone();
+                table.insert(0, *to);
+                table
+            })
+        });
+        let with_zeros: Vec<_> = with_zeros.collect();
+        tables.extend(with_zeros);
         Ok(tables)
     }
 

@@ -16,6 +16,7 @@ use super::draw::{Modular, Of, decimal};
 use super::form::{Form, Reading, Trouble};
 use super::system::System;
 use super::text::{Start, Text, waveform_of};
+use super::uncut::Uncut;
 use crate::bond::graph::{self, BondGraph, Law, ParameterId, SignalId};
 use crate::circuit::{DeviceKind, NodeId};
 use crate::netlist::flatten::scope::{self, ScopeId};
@@ -191,7 +192,7 @@ impl<'t, F: Modular> Wires<'t, F> {
         scope: ScopeId,
         expr: &Expr,
         solution: &[F],
-        cut: Option<&HashMap<u64, F>>,
+        cut: Option<&Uncut<F>>,
     ) -> Result<F, Trouble> {
         Reading { draw: self.bonds.draw, cut }
             .number(expr, &mut |leaf, _| Ok(Form::number(self.leaf(scope, leaf)?.at(solution))))
