@@ -15,6 +15,7 @@ mod markowitz;
 mod matching;
 mod pattern;
 mod pivots;
+pub mod relations;
 pub mod roots;
 pub mod symmetric;
 #[cfg(test)]

@@ -228,84 +228,80 @@ impl<'a> Builder<'a> {
 
     /// Makes the rates of dependent charges unknowns of their own, until no constraint is left that can be used.
     fn reduce(&mut self) {
-        let n = self.unknowns.len();
-        let mut slopes: Vec<(u32, u32)> = vec![];
-        // Laws of time or of modes alone have no slope, and yet they move what stands in their equations.
-        let mut lawful: Vec<u32> = vec![];
-        let mut curved_charges = vec![];
-        for (dag, laws, _) in &self.groups {
-            for law in laws {
-                let inputs = dag.inputs_of(law.node).into_iter().filter(|input| *input < n as u32);
-                match &law.target {
-                    Target::Equations(into) => {
-                        lawful.extend(into.iter().map(|(row, _)| *row));
-                        for input in inputs {
-                            slopes.extend(into.iter().map(|(row, _)| (*row, input)));
-                        }
-                    }
-                    Target::Charge(k) => curved_charges.extend(inputs.map(|input| (*k, input))),
-                }
-            }
-        }
         let initial: Vec<Option<f64>> = self.stamps.charges.iter().map(|c| c.initial).collect();
-        // The search factorises a matrix; where that is dear, the run itself finds out.
-        const MOST: usize = 5000;
-        while self.dependent.contains(&false) && n + self.dependent.len() <= MOST {
-            // b of each equation, where no source moves it.
-            let mut constant = vec![Some(0.0); self.unknowns.len()];
-            for (row, value) in &self.constants {
-                constant[*row as usize] = constant[*row as usize].map(|b: f64| b + value);
-            }
-            for source in &self.stamps.sources {
-                let fixed = source.waveform.is_constant().then(|| source.waveform.value(0.0));
-                for (row, factor) in &source.into {
-                    let b = &mut constant[row.0 as usize];
-                    *b = b.zip(fixed).map(|(b, value)| b + factor * value);
-                }
-            }
-            for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
-                constant[row.0 as usize] = None;
-            }
-            for row in &lawful {
-                constant[*row as usize] = None;
-            }
-            let mut charges = self.charge_entries.clone();
-            charges.extend(curved_charges.iter().map(|(k, input)| (*k, *input, 1.5)));
-            let found = reduce::constraint(&reduce::Parts {
+        while self.dependent.contains(&false) {
+            let constant = self.constant();
+            let found = reduce::constraints(&reduce::Parts {
                 n: self.unknowns.len(),
                 conductances: &self.conductances,
-                slopes: &slopes,
-                charges: &charges,
+                charges: &self.charge_entries,
                 rates: &self.rate_entries,
                 dependent: &self.dependent,
                 curved: &self.curved,
                 constant: &constant,
                 initial: &initial,
             });
-            let Some(reduce::Constraint { charge: k, factors }) = found else { return };
-            self.dependent[k as usize] = true;
-            let known = self.rate_unknowns.get(&k).copied();
-            self.add_rate(k);
-            let Some(w) = self.rate_unknowns.get(&k).copied() else { return };
-            if known.is_some() {
-                self.conductances.retain(|(row, ..)| *row != w);
-                self.rate_entries.retain(|(_, row, _)| *row != w);
+            if found.is_empty() {
+                return;
             }
-            // The charge's rate is now w wherever it stood.
-            for (_, row, factor) in self.rate_entries.extract_if(.., |(charge, ..)| *charge == k) {
-                self.conductances.push((row, w, factor));
+            let mut solved: BTreeMap<u32, u32> = BTreeMap::new();
+            let mut known = vec![false; self.unknowns.len()];
+            for constraint in &found {
+                let k = constraint.charge;
+                self.dependent[k as usize] = true;
+                if let Some(w) = self.rate_unknowns.get(&k) {
+                    known[*w as usize] = true;
+                }
+                self.add_rate(k);
+                solved.extend(self.rate_unknowns.get(&k).map(|w| (k, *w)));
             }
-            for (j, z) in factors {
-                // Of several dependent charges each rate is an unknown.
-                if self.dependent[j as usize] {
-                    if let Some(rate) = self.rate_unknowns.get(&j) {
-                        self.conductances.push((w, *rate, z));
+            let is_known = |row: &u32| known.get(*row as usize) == Some(&true);
+            self.conductances.retain(|(row, ..)| !is_known(row));
+            self.rate_entries.retain(|(_, row, _)| !is_known(row));
+            // Each charge's rate is now w wherever it stood.
+            for (k, row, factor) in
+                self.rate_entries.extract_if(.., |(charge, ..)| solved.contains_key(charge))
+            {
+                self.conductances.extend(solved.get(&k).map(|w| (row, *w, factor)));
+            }
+            for reduce::Constraint { charge, factors } in found {
+                let Some(w) = solved.get(&charge) else { continue };
+                for (j, z) in factors {
+                    // Of several dependent charges each rate is an unknown.
+                    if self.dependent[j as usize] {
+                        let rate = self.rate_unknowns.get(&j);
+                        self.conductances.extend(rate.map(|rate| (*w, *rate, z)));
+                    } else {
+                        self.rate_entries.push((j, *w, z));
                     }
-                } else {
-                    self.rate_entries.push((j, w, z));
                 }
             }
         }
+    }
+
+    /// b of each equation, where no source, no memory and no law moves it.
+    fn constant(&self) -> Vec<Option<f64>> {
+        let mut constant = vec![Some(0.0); self.unknowns.len()];
+        for (row, value) in &self.constants {
+            constant[*row as usize] = constant[*row as usize].map(|b: f64| b + value);
+        }
+        for source in &self.stamps.sources {
+            let fixed = source.waveform.is_constant().then(|| source.waveform.value(0.0));
+            for (row, factor) in &source.into {
+                let b = &mut constant[row.0 as usize];
+                *b = b.zip(fixed).map(|(b, value)| b + factor * value);
+            }
+        }
+        for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
+            constant[row.0 as usize] = None;
+        }
+        let laws = self.groups.iter().flat_map(|(_, laws, _)| laws);
+        for law in laws {
+            if let Target::Equations(into) = &law.target {
+                into.iter().for_each(|(row, _)| constant[*row as usize] = None);
+            }
+        }
+        constant
     }
 
     fn finish(mut self) -> System {

@@ -5,7 +5,6 @@
 use super::events::Track;
 use super::laws::{LawSet, Registers};
 use super::memory::Memories;
-use super::reduce::null_vector;
 use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
 use crate::circuit::waveform::Segment;
@@ -508,7 +507,7 @@ impl<'a> Network<'a> {
 
     /// The one combination of these rows of the frozen matrix that vanishes.
     pub fn frozen_null_vector(&self, rows: &[u32]) -> Option<Vec<f64>> {
-        null_vector(rows, &self.system.frozen.pattern, &self.frozen.values)
+        super::ties::null_vector(rows, &self.system.frozen.pattern, &self.frozen.values)
     }
 
     /// Whether a row of a charge that is not held takes part in what makes the frozen matrix singular.

@@ -4,16 +4,18 @@
 //! With b constant in those equations, z·dQ/dt = 0: the rate of one such charge becomes an unknown w with this row, and
 //! the circuit is of index 1 again (two inertias on one gear; capacitors in parallel through an ideal transformer).
 //! Where b moves or laws take part, nothing is changed: the run then treats the circuit as one of index 2.
+//!
+//! Only rows with a constant b and without laws are looked at, and of those none that alone speaks of some unknown: its
+//! factor is 0 in every null vector. What remains, mostly nothing, goes through one elimination.
 
-use crate::linear::{Lu, Pattern};
+use crate::linear::relations::{Relations, Taken};
+use std::cmp::Reverse;
 
 /// A linear circuit's parts as triplets, as far as the reduction needs them.
 pub(crate) struct Parts<'a> {
     /// Number of equations.
     pub n: usize,
     pub conductances: &'a [(u32, u32, f64)],
-    /// (equation, unknown) of the laws.
-    pub slopes: &'a [(u32, u32)],
     /// (charge, unknown, factor)
     pub charges: &'a [(u32, u32, f64)],
     /// (charge, equation, factor)
@@ -21,7 +23,7 @@ pub(crate) struct Parts<'a> {
     /// Charges that are no states already, and those with laws.
     pub dependent: &'a [bool],
     pub curved: &'a [bool],
-    /// For each equation b, where it never changes.
+    /// For each equation b, where it never changes and no law takes part.
     pub constant: &'a [Option<f64>],
     /// Initial charges.
     pub initial: &'a [Option<f64>],
@@ -35,62 +37,122 @@ pub(crate) struct Constraint {
 
 /// Initial charges satisfy a constraint when they do to this part of its terms; otherwise they have yet to jump there.
 const CONSISTENT: f64 = 1e-9;
+/// A constraint of more rows than this is left to the run.
+const LONGEST: usize = 64;
+/// How often rows that alone speak of some unknown are looked for.
+const ROUNDS: usize = 32;
+/// Multiplications that the elimination may take; what it has found until then is used.
+const MULTIPLICATIONS: usize = 20_000_000;
+const NONE: u32 = u32::MAX;
 
-/// The next constraint of a circuit, if it has one that can be used.
-pub(crate) fn constraint(parts: &Parts) -> Option<Constraint> {
-    let n = parts.n;
-    let count = parts.dependent.len();
-    let mut entries: Vec<(u32, u32)> = vec![];
-    let mut values: Vec<f64> = vec![];
-    let mut put = |row: usize, column: usize, value: f64| {
-        entries.push((row as u32, column as u32));
-        values.push(value);
-    };
-    for (row, column, value) in parts.conductances {
-        put(*row as usize, *column as usize, *value);
+/// A circuit's constraints that can be used, each with a charge of its own.
+pub(crate) fn constraints(parts: &Parts) -> Vec<Constraint> {
+    let rows = kernel(parts);
+    let mut relations = Relations::new(
+        parts.n + parts.dependent.len(),
+        rows.iter().map(|(_, entries)| entries.as_slice()),
+        MULTIPLICATIONS,
+    );
+    let mut found: Vec<Vec<(u32, f64)>> = vec![];
+    for (_, entries) in &rows {
+        match relations.take(entries) {
+            Taken::Relation(relation) if relation.len() <= LONGEST => {
+                let relation = relation.iter().map(|(at, y)| (rows[*at as usize].0, *y));
+                found.extend(usable(parts, &relation.collect::<Vec<_>>()));
+            }
+            Taken::Enough => break,
+            Taken::Relation(_) | Taken::Independent(_) | Taken::Unclear => {}
+        }
     }
-    for (k, row, factor) in parts.rates {
-        put(*row as usize, n + *k as usize, *factor);
-    }
-    for (k, column, value) in parts.charges.iter().filter(|(k, ..)| !parts.dependent[*k as usize]) {
-        put(n + *k as usize, *column as usize, *value);
-    }
-    for k in (0..count).filter(|k| parts.dependent[*k]) {
-        put(n + k, n + k, 1.0);
-    }
-    // Laws have some slope; which one does not matter, as long as it is in no relation to the rest.
-    for (at, (row, column)) in parts.slopes.iter().enumerate() {
-        put(*row as usize, *column as usize, 1.0 + 0.618_033_988_75 * (at as f64 + 1.0) % 1.0);
-    }
-    let (pattern, slots) = Pattern::from_triplets(n + count, &entries);
-    let mut matrix = vec![0.0; pattern.len()];
-    for (slot, value) in slots.iter().zip(&values) {
-        matrix[*slot as usize] += value;
-    }
-    let singular = Lu::factor(&pattern, &matrix).err()?;
-    singular.rows.iter().find_map(|set| usable(parts, set, &pattern, &matrix))
+    // Each is solved for a charge of its own, such that all are solved for at once.
+    found.sort_by_key(Vec::len);
+    let all = found.iter().map(Vec::as_slice);
+    let mut pivots = Relations::new(parts.dependent.len(), all, MULTIPLICATIONS).level();
+    let solved = found.into_iter().filter_map(|factors| match pivots.take(&factors) {
+        Taken::Independent(charge) => Some(Constraint { charge, factors }),
+        Taken::Relation(_) | Taken::Unclear | Taken::Enough => None,
+    });
+    solved.collect()
 }
 
-/// The constraint that a set of dependent rows makes, if b is constant there, no law takes part, and the initial charges
-/// satisfy it.
-fn usable(parts: &Parts, set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Option<Constraint> {
-    let n = parts.n as u32;
-    let lawful = |row: u32| {
-        if row < n {
-            parts.slopes.iter().all(|(equation, _)| *equation != row)
-                && parts.constant[row as usize].is_some()
-        } else {
-            let k = (row - n) as usize;
-            !parts.curved[k] && !parts.dependent[k]
+/// Rows (equations, then charges) that may take part in a constraint, in the order in which they are to be eliminated:
+/// charges first, so that constraints are short, of those the large ones, which then are states.
+fn kernel(parts: &Parts) -> Vec<(u32, Vec<(u32, f64)>)> {
+    let (n, count) = (parts.n, parts.dependent.len());
+    let of_charge = |k: usize| !parts.curved[k] && !parts.dependent[k];
+    let mut takes_part: Vec<bool> =
+        parts.constant.iter().map(Option::is_some).chain((0..count).map(of_charge)).collect();
+    let conductances = parts.conductances.iter().copied();
+    let rates = parts.rates.iter().map(|(k, row, factor)| (*row, n as u32 + k, *factor));
+    let charges = parts.charges.iter().map(|(k, column, value)| (n as u32 + k, *column, *value));
+    let mut entries: Vec<(u32, u32, f64)> = vec![];
+    let mut only: Vec<u32> = vec![];
+    for round in 0..ROUNDS {
+        if !takes_part[n..].contains(&true) {
+            return vec![];
         }
-    };
-    if set.len() > 64 || !set.iter().all(|row| lawful(*row)) {
-        return None;
+        const SEVERAL: u32 = NONE - 1;
+        only.clear();
+        only.resize(n + count, NONE);
+        let mut see = |(row, column, value): (u32, u32, f64)| {
+            if takes_part[row as usize] && value != 0.0 {
+                let known = &mut only[column as usize];
+                *known = if *known == NONE || *known == row { row } else { SEVERAL };
+            }
+        };
+        if round == 0 {
+            conductances.clone().chain(rates.clone()).chain(charges.clone()).for_each(&mut see);
+        } else {
+            entries.iter().copied().for_each(&mut see);
+        }
+        let mut any = false;
+        for row in only.iter().filter(|row| **row < SEVERAL) {
+            takes_part[*row as usize] = false;
+            any = true;
+        }
+        if round == 0 {
+            let all = conductances.clone().chain(rates.clone()).chain(charges.clone());
+            entries = all.filter(|(row, ..)| takes_part[*row as usize]).collect();
+        } else {
+            entries.retain(|(row, ..)| takes_part[*row as usize]);
+        }
+        if !any {
+            break;
+        }
     }
-    let y = null_vector(set, pattern, matrix)?;
+    let mut rows = summed(entries);
+    rows.sort_by_cached_key(|(row, entries)| {
+        let largest = entries.iter().fold(0.0f64, |most, (_, value)| most.max(value.abs()));
+        // Bits of numbers that are not negative are ordered as these are.
+        ((*row as usize) < n, entries.len(), Reverse(largest.to_bits()), *row)
+    });
+    rows
+}
+
+/// Entries row by row, those of one place added up, and left out where nothing but rounding is left.
+fn summed(mut entries: Vec<(u32, u32, f64)>) -> Vec<(u32, Vec<(u32, f64)>)> {
+    entries.sort_by_key(|(row, column, _)| (*row, *column));
+    let mut rows: Vec<(u32, Vec<(u32, f64)>)> = vec![];
+    for of_row in entries.chunk_by(|a, b| a.0 == b.0) {
+        let mut sums = vec![];
+        for of_place in of_row.chunk_by(|a, b| a.1 == b.1) {
+            let sum: f64 = of_place.iter().map(|entry| entry.2).sum();
+            let largest = of_place.iter().fold(0.0f64, |most, entry| most.max(entry.2.abs()));
+            if sum.abs() > of_place.len() as f64 * f64::EPSILON * largest {
+                sums.push((of_place[0].1, sum));
+            }
+        }
+        rows.push((of_row[0].0, sums));
+    }
+    rows
+}
+
+/// The factors of the charges in a null vector, if the initial charges satisfy its constraint.
+fn usable(parts: &Parts, vector: &[(u32, f64)]) -> Option<Vec<(u32, f64)>> {
+    let n = parts.n as u32;
     let mut factors: Vec<(u32, f64)> = vec![];
     let (mut sum, mut size) = (0.0f64, 0.0f64);
-    for (row, y) in set.iter().zip(&y) {
+    for (row, y) in vector {
         let term = if *row < n {
             y * parts.constant[*row as usize]?
         } else {
@@ -104,67 +166,6 @@ fn usable(parts: &Parts, set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Opti
         return None;
     }
     let largest = factors.iter().fold(0.0f64, |most, (_, z)| most.max(z.abs()));
-    for (_, z) in &mut factors {
-        *z /= largest;
-    }
-    let (charge, _) = *factors.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    Some(Constraint { charge, factors })
-}
-
-/// The one combination of these rows that vanishes, by elimination with full pivoting.
-pub(crate) fn null_vector(set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Option<Vec<f64>> {
-    let mut columns: Vec<Vec<f64>> = vec![];
-    for j in 0..pattern.n {
-        let mut column = vec![0.0; set.len()];
-        for slot in pattern.column(j) {
-            if let Some(at) = set.iter().position(|row| *row == pattern.rows[slot]) {
-                column[at] = matrix[slot];
-            }
-        }
-        let largest = column.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        if largest > 0.0 {
-            columns.push(column.iter().map(|v| v / largest).collect());
-        }
-    }
-    // Each column is an equation for y. Gauss-Jordan; one unknown must be left over.
-    let count = set.len();
-    let mut pivots: Vec<(usize, usize)> = vec![];
-    loop {
-        let mut best = (1e-9, 0, 0);
-        for (e, equation) in columns.iter().enumerate() {
-            if pivots.iter().any(|(used, _)| *used == e) {
-                continue;
-            }
-            for (u, value) in equation.iter().enumerate() {
-                if value.abs() > best.0 && pivots.iter().all(|(_, taken)| *taken != u) {
-                    best = (value.abs(), e, u);
-                }
-            }
-        }
-        if best.0 <= 1e-9 {
-            break;
-        }
-        let (e, u) = (best.1, best.2);
-        let pivot: Vec<f64> = columns[e].iter().map(|v| v / columns[e][u]).collect();
-        for (other, equation) in columns.iter_mut().enumerate() {
-            let factor = equation[u];
-            if other != e && factor != 0.0 {
-                for (value, p) in equation.iter_mut().zip(&pivot) {
-                    *value -= factor * p;
-                }
-            }
-        }
-        columns[e] = pivot;
-        pivots.push((e, u));
-    }
-    if pivots.len() + 1 != count {
-        return None;
-    }
-    let free = (0..count).find(|u| pivots.iter().all(|(_, taken)| taken != u))?;
-    let mut y = vec![0.0; count];
-    y[free] = 1.0;
-    for (e, u) in pivots {
-        y[u] = -columns[e][free];
-    }
-    Some(y)
+    factors.iter_mut().for_each(|(_, z)| *z /= largest);
+    Some(factors)
 }

@@ -8,7 +8,7 @@
 use super::network::Network;
 use super::newton::{Cut, Scratch};
 use super::op::State;
-use crate::linear::Singular;
+use crate::linear::{Pattern, Singular};
 
 /// A sum of charges that keeps its value.
 #[derive(Clone, Debug)]
@@ -187,4 +187,62 @@ fn eliminate(mut a: Vec<f64>, mut b: Vec<f64>) -> Option<Vec<f64>> {
         b[k] /= a[k * m + k];
     }
     b.iter().all(|value| value.is_finite()).then_some(b)
+}
+
+/// The one combination of these rows that vanishes, by elimination with full pivoting.
+pub(super) fn null_vector(set: &[u32], pattern: &Pattern, matrix: &[f64]) -> Option<Vec<f64>> {
+    let mut columns: Vec<Vec<f64>> = vec![];
+    for j in 0..pattern.n {
+        let mut column = vec![0.0; set.len()];
+        for slot in pattern.column(j) {
+            if let Some(at) = set.iter().position(|row| *row == pattern.rows[slot]) {
+                column[at] = matrix[slot];
+            }
+        }
+        let largest = column.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        if largest > 0.0 {
+            columns.push(column.iter().map(|v| v / largest).collect());
+        }
+    }
+    // Each column is an equation for y. Gauss-Jordan; one unknown must be left over.
+    let count = set.len();
+    let mut pivots: Vec<(usize, usize)> = vec![];
+    loop {
+        let mut best = (1e-9, 0, 0);
+        for (e, equation) in columns.iter().enumerate() {
+            if pivots.iter().any(|(used, _)| *used == e) {
+                continue;
+            }
+            for (u, value) in equation.iter().enumerate() {
+                if value.abs() > best.0 && pivots.iter().all(|(_, taken)| *taken != u) {
+                    best = (value.abs(), e, u);
+                }
+            }
+        }
+        if best.0 <= 1e-9 {
+            break;
+        }
+        let (e, u) = (best.1, best.2);
+        let pivot: Vec<f64> = columns[e].iter().map(|v| v / columns[e][u]).collect();
+        for (other, equation) in columns.iter_mut().enumerate() {
+            let factor = equation[u];
+            if other != e && factor != 0.0 {
+                for (value, p) in equation.iter_mut().zip(&pivot) {
+                    *value -= factor * p;
+                }
+            }
+        }
+        columns[e] = pivot;
+        pivots.push((e, u));
+    }
+    if pivots.len() + 1 != count {
+        return None;
+    }
+    let free = (0..count).find(|u| pivots.iter().all(|(_, taken)| taken != u))?;
+    let mut y = vec![0.0; count];
+    y[free] = 1.0;
+    for (e, u) in pivots {
+        y[u] = -columns[e][free];
+    }
+    Some(y)
 }

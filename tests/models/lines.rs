@@ -1,4 +1,5 @@
-//! Lossless transmission lines in decks (T cards), against closed forms: waves that arrive and come back.
+//! Lossless transmission lines in decks (T cards), against closed forms: waves that arrive and come back. Lines of many
+//! sections, and storages that are tied to each other in large numbers.
 
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::pipeline::run_text;
@@ -8,6 +9,12 @@ use bondspice::trace::Trace;
 fn run(text: &str) -> Trace {
     let run = run_text("line.cir", text, &Overrides::default());
     run.unwrap_or_else(|d| panic!("{d:#?}\n{text}")).0
+}
+
+#[track_caller]
+fn on_a_grid(text: &str, step: &str) -> Trace {
+    let grid = Overrides { step: Some(step.to_string()), ..Overrides::default() };
+    run_text("line.cir", text, &grid).unwrap_or_else(|d| panic!("{d:#?}")).0
 }
 
 fn column<'a>(trace: &'a Trace, name: &str) -> &'a [f64] {
@@ -124,5 +131,72 @@ fn a_swinging_source_sees_the_lines_input_impedance() {
         let far = column(&trace, "v(out)")[row];
         assert!((near - sin / 3.0).abs() < 1e-5, "in at {t}: {near} for {}", sin / 3.0);
         assert!((far + cos * 2.0 / 3.0).abs() < 1e-5, "out at {t}: {far} for {}", -cos * 2.0 / 3.0);
+    }
+}
+
+/// Two lines of sections R, L and C, coupled by M and by a capacitor between them in each section, which closes a loop of
+/// three: none of these has an initial value of its own. Their even and odd modes are two lines that know nothing of each
+/// other, with (1 + k)·L and C, and with (1 − k)·L and C + 2·Cm.
+#[test]
+fn two_hundred_coupled_sections_are_their_two_modes() {
+    let n = 200;
+    let ladder = |name: &str, l: f64, c: f64| -> String {
+        let section = |k: usize| {
+            let [from, to] = [k, k + 1].map(|k| format!("{name}{k}"));
+            format!(
+                "R{name}{k} {from} x{to} 0.1\nL{name}{k} x{to} {to} {l:e}\nC{name}{k} {to} 0 {c:e}\n"
+            )
+        };
+        let sections: String = (0..n).map(section).collect();
+        format!("{sections}Rend{name} {name}{n} 0 70\n")
+    };
+    let coupled: String =
+        (0..n).map(|k| format!("Kab{k} La{k} Lb{k} 0.4\nCm{k} a{0} b{0} 0.5p\n", k + 1)).collect();
+    let step = "PWL(0 0 50p 1)";
+    let tail = ".options reltol=1e-7\n.tran 10p 3n\n.end\n";
+    let deck = format!(
+        "coupled lines\nVa ina 0 {step}\nRa ina a0 50\nRb b0 0 50\n{}{}{coupled}.save v(a40) v(b40)\n{tail}",
+        ladder("a", 1e-9, 1e-12),
+        ladder("b", 1e-9, 1e-12),
+    );
+    let modes = format!(
+        "modes\nVe ine 0 {step}\nRe ine e0 50\nRo ine o0 50\n{}{}.save v(e40) v(o40)\n{tail}",
+        ladder("e", 1.4e-9, 1e-12),
+        ladder("o", 0.6e-9, 2e-12),
+    );
+    let (lines, modes) = (on_a_grid(&deck, "0.1n"), on_a_grid(&modes, "0.1n"));
+    let (even, odd) = (column(&modes, "v(e40)"), column(&modes, "v(o40)"));
+    let (a, b) = (column(&lines, "v(a40)"), column(&lines, "v(b40)"));
+    assert!(even.iter().fold(0.0f64, |most, v| most.max(v.abs())) > 0.1);
+    for k in 0..even.len() {
+        // Both runs keep 1e-7 in each of some thousand steps.
+        assert!((a[k] - 0.5 * (even[k] + odd[k])).abs() < 1e-5, "{} at row {k}", a[k]);
+        assert!((b[k] - 0.5 * (even[k] - odd[k])).abs() < 1e-5, "{} at row {k}", b[k]);
+    }
+}
+
+/// 20,000 capacitors side by side, each of another size, are one; as many inductors in a row are one.
+#[test]
+fn twenty_thousand_parallel_capacitors_are_one() {
+    let n = 20_000;
+    let sizes = (0..n).map(|k| 1e-12 * (1.0 + (k % 7) as f64));
+    let cards: String =
+        sizes.clone().enumerate().map(|(k, c)| format!("C{k} a 0 {c:e}\n")).collect();
+    let deck = format!(
+        "side by side\nV1 in 0 1\nR1 in a 1k\n{cards}.save v(a) i(C3)\n.options reltol=1e-7\n.tran 1u 400u uic\n.end\n"
+    );
+    let total: f64 = sizes.sum();
+    let trace = run(&deck);
+    let (v, i) = (column(&trace, "v(a)"), column(&trace, "i(c3)"));
+    let tau = 1e3 * total;
+    for (k, t) in trace.time().iter().enumerate() {
+        let left = (-t / tau).exp();
+        assert!((v[k] - (1.0 - left)).abs() < 1e-5, "{} at {t}", v[k]);
+        // The fourth capacitor takes its part of the current.
+        assert!(
+            (i[k] - 4e-12 / total * 1e-3 * left).abs() < 1e-5 * 4e-12 / total * 1e-3,
+            "{} at {t}",
+            i[k]
+        );
     }
 }
