@@ -117,8 +117,9 @@ pub fn start(
     }
     let horizon = first_segment(graph, equations);
     let mut slots = consistent::free_dependents(compiled, structure, &y);
-    let dependent = |k: usize| structure.constraints.iter().any(|c| c.dependent == k);
-    for (k, said) in said.iter().enumerate().filter(|(k, _)| !dependent(*k)) {
+    let mut dependent = vec![false; compiled.n];
+    structure.constraints.iter().for_each(|c| dependent[c.dependent] = true);
+    for (k, said) in said.iter().enumerate().filter(|(k, _)| !dependent[*k]) {
         match said {
             Said::Value { .. } => {}
             Said::Power { column, value } => slots[k] = Slot::fix(*column, *value),
@@ -133,7 +134,8 @@ pub fn start(
         return None;
     }
     for constraint in &structure.constraints {
-        clash(graph, equations, constraint, &said, &y, d);
+        let rows = || structure.rows(constraint.made);
+        clash(graph, equations, constraint, &rows, &said, &y, d);
     }
     contradictions(graph, equations, structure, 0.5 * horizon, &y, d);
     if d[before..].iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
@@ -385,6 +387,7 @@ fn clash(
     graph: &BondGraph,
     equations: &Equations,
     constraint: &Constraint,
+    rows: &dyn Fn() -> Vec<usize>,
     said: &[Said],
     y: &[f64],
     d: &mut Vec<Diagnostic>,
@@ -421,10 +424,7 @@ fn clash(
     }
     d.push(
         diagnostic
-            .because(format!(
-                "they are tied together by {}",
-                elements(graph, equations, &constraint.rows)
-            ))
+            .because(format!("they are tied together by {}", elements(graph, equations, &rows())))
             .help("leave the value of one of them out: it then takes the implied one"),
     );
 }
@@ -438,7 +438,7 @@ fn contradictions(
     y: &[f64],
     d: &mut Vec<Diagnostic>,
 ) {
-    for (row, rows) in &structure.idle {
+    for (row, made) in &structure.idle {
         let formula: &Formula = &equations.algebraic[*row];
         let mut size = 0.0f64;
         formula.leaves(&mut |leaf, _| {
@@ -451,10 +451,11 @@ fn contradictions(
             .next()
             .unwrap_or(0.0);
         if value.abs() > 1e-9 * size {
-            let span = spans(graph, equations, rows).first().copied().unwrap_or(Span::NONE);
+            let rows = structure.rows(*made);
+            let span = spans(graph, equations, &rows).first().copied().unwrap_or(Span::NONE);
             d.push(
                 Diagnostic::error("E0501", span, "these equations cannot all hold")
-                    .because(format!("they come from {}", elements(graph, equations, rows)))
+                    .because(format!("they come from {}", elements(graph, equations, &rows)))
                     .because(format!("they are off by {value} at t = 0"))
                     .help("two of them set the same variable; take one away, or put an element between them"),
             );

@@ -48,7 +48,8 @@ pub fn prepare(
             .filter(|i| structure.loose[*i])
             .map(|i| unknown_name(graph, equations.unknowns[i]))
             .collect();
-        let rows: Vec<usize> = structure.idle.iter().flat_map(|(_, rows)| rows.clone()).collect();
+        let rows: Vec<usize> =
+            structure.idle.iter().flat_map(|(_, made)| structure.rows(*made)).collect();
         let span = spans(graph, &equations, &rows).first().copied().unwrap_or(Span::NONE);
         d.push(
             Diagnostic::warning("W0510", span, format!("nothing determines {}", loose.join(", ")))
@@ -70,7 +71,8 @@ fn undetermined_derivative(
     equations: &Equations,
     structure: &Structure,
 ) -> Diagnostic {
-    let rows: Vec<usize> = structure.constraints.iter().flat_map(|c| c.rows.clone()).collect();
+    let rows: Vec<usize> =
+        structure.constraints.iter().flat_map(|c| structure.rows(c.made)).collect();
     let span = spans(graph, equations, &rows).first().copied().unwrap_or(Span::NONE);
     let empty = rows.iter().find_map(|row| match equations.origins.get(*row) {
         Some(Origin::Vertex(id)) => stores_nothing(graph, *id).then_some(graph.vertex(*id)),

@@ -36,17 +36,21 @@ pub struct Constraint {
     pub on: Vec<usize>,
     /// The algebraic row that became it.
     pub row: usize,
-    /// All algebraic rows that it follows from.
-    pub rows: Vec<usize>,
+    /// How it was made: for [`Structure::rows`].
+    pub made: Made,
 }
+
+/// How a row was made of others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Made(usize);
 
 /// What the equations determine.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Structure {
     /// Constraints between states.
     pub constraints: Vec<Constraint>,
-    /// Algebraic rows that follow from others, each with all the rows that it was made of.
-    pub idle: Vec<(usize, Vec<usize>)>,
+    /// Algebraic rows that follow from others, and how each was made.
+    pub idle: Vec<(usize, Made)>,
     /// Unknowns that are found from derivatives of the constraints and are free in h, one for each constraint unless
     /// some are `higher`.
     pub hidden: Vec<usize>,
@@ -58,6 +62,53 @@ pub struct Structure {
     pub loose: Vec<bool>,
     /// Constraints whose derivatives do not determine anything: index 3 or more.
     pub higher: usize,
+    trail: Trail,
+}
+
+/// What was made of what.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Trail {
+    /// By algebraic row: the rows that were taken from it while it was eliminated.
+    taken: Vec<Vec<usize>>,
+    /// Rows over states: an algebraic row, or two of these joined.
+    steps: Vec<Step>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    Row(usize),
+    Of(usize, usize),
+}
+
+impl Trail {
+    fn step(&mut self, step: Step) -> usize {
+        self.steps.push(step);
+        self.steps.len() - 1
+    }
+}
+
+impl Structure {
+    /// All algebraic rows that something was made of, ascending.
+    pub fn rows(&self, made: Made) -> Vec<usize> {
+        let mut seen = vec![false; self.trail.steps.len()];
+        let mut rows = BTreeSet::new();
+        let mut open = vec![made.0];
+        while let Some(at) = open.pop() {
+            if std::mem::replace(&mut seen[at], true) {
+                continue;
+            }
+            match self.trail.steps[at] {
+                Step::Row(row) => drop(rows.insert(row)),
+                Step::Of(a, b) => open.extend([a, b]),
+            }
+        }
+        let mut open: Vec<usize> = rows.iter().copied().collect();
+        while let Some(row) = open.pop() {
+            let taken = self.trail.taken[row].iter().copied();
+            open.extend(taken.filter(|other| rows.insert(*other)));
+        }
+        rows.into_iter().collect()
+    }
 }
 
 /// An entry with the largest magnitude that entered it.
@@ -79,15 +130,16 @@ enum Became {
     Nothing,
 }
 
-/// row −= factor·other; the entry at `pivot` vanishes exactly. Tells of each entry that appears or vanishes.
+/// row −= factor·other from a column on; the entry at `pivot` vanishes exactly. Tells of each entry that appears or
+/// vanishes.
 fn subtract(
     row: &mut Row,
     factor: f64,
     other: &Row,
-    pivot: usize,
+    [from, pivot]: [usize; 2],
     tell: &mut dyn FnMut(usize, Became),
 ) {
-    for (&column, entry) in other {
+    for (&column, entry) in other.range(from..) {
         let taken = factor * entry.value;
         let mine = row.get(&column).copied();
         let (value, weight) = match mine {
@@ -134,13 +186,19 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
 
     // h over z.
     let Elimination { mut pivots, left, made_of } = eliminate(rows, nx, n);
-    let left = left.into_iter().map(|(i, row)| Left { row, from: origins(i, &made_of), origin: i });
+    let mut trail = Trail { taken: made_of, steps: vec![] };
+    let left = left.into_iter().map(|(origin, row)| {
+        let from = trail.step(Step::Row(origin));
+        Left { row, from, origin }
+    });
+    let left = left.collect();
 
     // What is left speaks of x alone.
     let mut structure =
         Structure { index_two: vec![false; n], loose: vec![false; n], ..Structure::default() };
-    let (constraints, idle) = dependents(left.collect(), preference);
+    let (constraints, idle) = dependents(left, preference, &mut trail);
     structure.idle = idle;
+    structure.trail = trail;
 
     // The constraints' derivatives over the columns of z that have no pivot yet.
     let rates: Vec<Row> = equations.rates.iter().map(row).collect();
@@ -157,9 +215,8 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
         for (&state, entry) in constraint {
             // x in the constraint is scaled by its column, x' is not.
             let factor = entry.value / column_scales[state] * scale_of_rate(state);
-            subtract(&mut derivative, -factor, &rates[state], usize::MAX, &mut |_, _| {});
+            subtract(&mut derivative, -factor, &rates[state], [nx, usize::MAX], &mut |_, _| {});
         }
-        derivative.retain(|column, _| *column >= nx);
         // A pivot row speaks of later pivots only.
         let mut open: BTreeSet<usize> =
             derivative.keys().filter_map(|column| place[*column]).collect();
@@ -171,8 +228,7 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
                         open.extend(place[column]);
                     }
                 };
-                subtract(&mut derivative, own / by, pivot, *column, &mut tell);
-                derivative.retain(|column, _| *column >= nx);
+                subtract(&mut derivative, own / by, pivot, [nx, *column], &mut tell);
             }
         }
         derivatives.push(derivative);
@@ -180,7 +236,7 @@ pub fn analyse(equations: &Linearised, preference: &[usize]) -> Structure {
             dependent: *dependent,
             on: constraint.keys().copied().filter(|k| k != dependent).collect(),
             row: *origin,
-            rows: from.iter().copied().collect(),
+            made: Made(*from),
         });
     }
     let before = pivots.len();
@@ -275,7 +331,7 @@ fn eliminate(mut rows: Vec<Row>, nx: usize, n: usize) -> Elimination {
                     }
                 }
             };
-            subtract(target, own / at, &row, pivot, &mut tell);
+            subtract(target, own / at, &row, [0, pivot], &mut tell);
             made_of[other].push(i);
             queue.insert((counts[other], other));
         }
@@ -284,22 +340,12 @@ fn eliminate(mut rows: Vec<Row>, nx: usize, n: usize) -> Elimination {
     Elimination { pivots, left, made_of }
 }
 
-/// The rows that a row was made of, itself one of them.
-fn origins(row: usize, made_of: &[Vec<usize>]) -> BTreeSet<usize> {
-    let (mut found, mut open) = (BTreeSet::from([row]), vec![row]);
-    while let Some(row) = open.pop() {
-        open.extend(made_of[row].iter().copied().filter(|other| found.insert(*other)));
-    }
-    found
-}
-
 /// A row over states alone.
-#[derive(Clone)]
 struct Left {
     row: Row,
-    /// The algebraic row that became it, and all that it follows from.
+    /// The algebraic row that became it, and the step that made it.
     origin: usize,
-    from: BTreeSet<usize>,
+    from: usize,
 }
 
 /// Rows by the states that they make dependent.
@@ -307,35 +353,51 @@ type Dependents = Vec<(usize, Left)>;
 
 /// Of rows over states alone: each non-empty one makes the least preferred state dependent that it can. Returns
 /// reduced constraints with their dependent states, and the empty rows with what they were made of.
-fn dependents(mut rows: Vec<Left>, preference: &[usize]) -> (Dependents, Vec<(usize, Vec<usize>)>) {
+fn dependents(
+    mut rows: Vec<Left>,
+    preference: &[usize],
+    trail: &mut Trail,
+) -> (Dependents, Vec<(usize, Made)>) {
     let mut taken: Vec<Option<usize>> = vec![None; rows.len()];
+    let mut holders: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+    for (i, left) in rows.iter().enumerate() {
+        for state in left.row.keys() {
+            holders.entry(*state).or_default().insert(i);
+        }
+    }
     for &state in preference.iter().rev() {
-        let best = (0..rows.len())
-            .filter(|i| taken[*i].is_none())
+        let here: Vec<usize> = holders.get(&state).into_iter().flatten().copied().collect();
+        let best = here
+            .iter()
+            .filter(|i| taken[**i].is_none())
             .filter_map(|i| {
-                let own = value(&rows[i].row, state)?;
-                let largest = rows[i].row.values().fold(0.0f64, |m, e| m.max(e.value.abs()));
-                Some((i, own.abs() / largest))
+                let own = value(&rows[*i].row, state)?;
+                let largest = rows[*i].row.values().fold(0.0f64, |m, e| m.max(e.value.abs()));
+                Some((*i, own.abs() / largest))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, _)) = best else { continue };
         taken[i] = Some(state);
-        let pivot = rows[i].clone();
-        let at = value(&pivot.row, state).unwrap_or(1.0);
-        for (other, left) in rows.iter_mut().enumerate() {
-            if other != i
-                && let Some(own) = value(&left.row, state)
-            {
-                subtract(&mut left.row, own / at, &pivot.row, state, &mut |_, _| {});
-                left.from.extend(pivot.from.iter().copied());
-            }
+        let pivot = std::mem::take(&mut rows[i].row);
+        let at = value(&pivot, state).unwrap_or(1.0);
+        for other in here.into_iter().filter(|other| *other != i) {
+            let Some(own) = value(&rows[other].row, state) else { continue };
+            let mut tell = |column: usize, became| match became {
+                Became::Entry => drop(holders.entry(column).or_default().insert(other)),
+                Became::Nothing => {
+                    holders.get_mut(&column).map(|holders| holders.remove(&other));
+                }
+            };
+            subtract(&mut rows[other].row, own / at, &pivot, [0, state], &mut tell);
+            rows[other].from = trail.step(Step::Of(rows[other].from, rows[i].from));
         }
+        rows[i].row = pivot;
     }
     let (mut constraints, mut idle) = (vec![], vec![]);
     for (left, taken) in rows.into_iter().zip(taken) {
         match taken {
             Some(state) => constraints.push((state, left)),
-            None => idle.push((left.origin, left.from.into_iter().collect())),
+            None => idle.push((left.origin, Made(left.from))),
         }
     }
     (constraints, idle)
@@ -392,7 +454,7 @@ mod tests {
         assert_eq!(structure.constraints.len(), 1);
         assert_eq!(structure.constraints[0].dependent, 1);
         assert_eq!(structure.constraints[0].on, [0]);
-        assert_eq!(structure.constraints[0].rows, [0, 1, 2]);
+        assert_eq!(structure.rows(structure.constraints[0].made), [0, 1, 2]);
         assert_eq!(structure.index_two, [false, false, false, false, true, true]);
         assert_eq!(
             (structure.idle.len(), structure.undetermined.len(), structure.higher),
@@ -430,7 +492,7 @@ mod tests {
         };
         let structure = analyse(&ring, &[]);
         assert_eq!(structure.idle.len(), 1);
-        assert_eq!(structure.idle[0].1, [0, 1, 2]);
+        assert_eq!(structure.rows(structure.idle[0].1), [0, 1, 2]);
         assert_eq!(structure.undetermined.len(), 1);
         assert_eq!(structure.loose, [true, true, true]);
     }
