@@ -73,6 +73,11 @@ pub fn verify(
         if !given.clone().any(|(key, _)| key.eq_ignore_ascii_case("reltol")) {
             circuit.options.push(("reltol".into(), format!("{:e}", demands.reltol)));
         }
+        if question.netlist.is_none() {
+            // What fails is told in the words of the bond graph, as when it is simulated.
+            let (own, names) = model.netlist(map, question.to.unwrap_or(&NGSPICE), false);
+            circuit.spoken = names.spoken(&own.names);
+        }
         circuit
     });
     let run = circuit.and_then(|circuit| ready(circuit, &deck_units(&netlist), true, None, d));

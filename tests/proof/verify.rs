@@ -4,7 +4,8 @@ use bondspice::bond::causality::{Causality, assign};
 use bondspice::bond::elaborate::{Overrides, elaborate, load};
 use bondspice::bond::graph::BondGraph;
 use bondspice::bond::initial;
-use bondspice::diagnostic::Diagnostic;
+use bondspice::cli::pipeline;
+use bondspice::diagnostic::{Diagnostic, Severity};
 use bondspice::expr::{Expr, Node};
 use bondspice::netlist::{CardKind, Element, Netlist};
 use bondspice::source::SourceMap;
@@ -292,4 +293,27 @@ fn the_command_reports_and_exits_as_agreed() {
     let (code, _, said) = run(&["blows_up.bg"]);
     assert_eq!(code, 4, "{said}");
     assert_eq!(run(&["nowhere.bg"]).0, 5);
+}
+
+/// A text's report, or what was said instead.
+fn of_text(text: &str) -> Result<Report, Vec<Diagnostic>> {
+    let (mut map, mut d) = (SourceMap::default(), vec![]);
+    let file = map.add("text.bg", text.to_string());
+    let (plain, question) = (Overrides::default(), pipeline::Question::default());
+    match pipeline::verify(&mut map, file, &plain, &question, &mut d, |_| {}) {
+        Ok(Some(report)) => Ok(report),
+        Ok(None) | Err(_) => Err(d),
+    }
+}
+
+#[test]
+fn what_cannot_be_solved_is_told_in_the_words_of_the_graph() {
+    // The table ends at an effort of 20, and the gyrator asks for more from t = 20/4.6 on.
+    let text = "signal u = ramp(0, 10)\n1:s\ns -> GY:g(4.6) -> 0:n\ns -> Sf:f(u)\ns -> R:r(3)\nn -> I:l(100)\n\
+                n -> R:t(e = table(f, [-10, -20; -1, -4; 1, 5; 10, 20]))\nsimulate until 1 step 0.01\nobserve e(n)\n";
+    let said = of_text(text).expect_err("it has no solution");
+    let error = said.iter().find(|d| d.severity == Severity::Error).unwrap();
+    let all = format!("{error:?}");
+    assert!(all.contains("t = 0.43"), "{all}");
+    assert!(all.contains("e(g.1)") && all.contains("nothing there gives an effort"), "{all}");
 }
