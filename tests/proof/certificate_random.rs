@@ -252,7 +252,7 @@ fn random_graphs_are_proven_or_told_by_name_4() {
 /// quotient of zeros, a law that is 0 beside other zeros, a part of a law that happens to have another law's value.
 #[test]
 fn graphs_that_were_refused_once_are_proven() {
-    for seed in [455, 162_853, 9715, 112_174] {
+    for seed in [455, 162_853, 9715, 46_570, 112_174, 143_283, 158_673] {
         match fate(seed) {
             Fate::Proven(_) => {}
             Fate::Told(code) => panic!("seed {seed}: {code}"),
