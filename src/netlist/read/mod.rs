@@ -102,6 +102,8 @@ pub fn read(
         diagnostics.extend(guess.by.map(|span| guessed(guess.dialect, span)));
         guess.dialect
     });
+    let lines = memchr::memchr_iter(b'\n', text.as_bytes()).count();
+    let room = lines.min(text.len() / SHORTEST);
     let includes = include::load(map, file, how, diagnostics);
     let mut reading = dialect.reading();
     if includes.replace_ground {
@@ -122,6 +124,8 @@ pub fn read(
         how,
     };
     let mut netlist = Netlist { dialect, title, ..Netlist::default() };
+    // A card a line, most often: moving a million of them as they come takes longer than reading them.
+    netlist.cards.reserve(room);
     let mut pile = Pile::new(map, file, reading.comments);
     let mut blocks = Blocks::default();
     let mut skipping: Option<Span> = None;
@@ -207,6 +211,9 @@ pub fn read(
     netlist.names = reader.names;
     netlist
 }
+
+/// Bytes of a card, at least on average: room is made for no more cards than that.
+const SHORTEST: usize = 16;
 
 /// Names of the ground where `.preprocess replaceground` asks for all of them.
 const EVERY_GROUND: &[&str] = &["0", "gnd", "gnd!", "ground"];
