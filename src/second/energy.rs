@@ -51,7 +51,10 @@ pub struct Energy {
     pub stored: f64,
     /// Given to what modulates.
     pub modulated: f64,
-    /// delivered − dissipated − stored − modulated.
+    /// Gained by stores at instants at which what they store jumps: a source's step that sets it, a modulus or a
+    /// modulated store that changes at once. No integral of a power holds it.
+    pub jumps: f64,
+    /// delivered + jumps − dissipated − stored − modulated.
     pub residual: f64,
     /// What the residual is to be compared with: Σ |delivered| of the sources, or the largest other sum; at least a
     /// thousandth of all that was moved to and fro, for what swings by itself.
@@ -65,12 +68,11 @@ pub fn carries_power(graph: &BondGraph, bond: BondId) -> bool {
     !matches!(graph.bond(bond).domain, Domain::PseudoThermal | Domain::Pneumatic)
 }
 
-/// The balance, from the work of every bond, ∫ |e·f| dt over all, and the unknowns at both ends of the run.
+/// The balance, from what was metered, and the unknowns at both ends of the run.
 pub fn balance(
     graph: &BondGraph,
     equations: &Equations,
-    work: &[f64],
-    moved: f64,
+    Meter { work, moved, jumps, jumped, .. }: &Meter,
     start: &[f64],
     end: &[f64],
 ) -> Energy {
@@ -102,11 +104,13 @@ pub fn balance(
         }
         energy.shares.push(Share { element: id, name: vertex.name.clone(), role, energy: amount });
     }
-    energy.residual = energy.delivered - energy.dissipated - energy.stored - energy.modulated;
+    energy.jumps = *jumps;
+    energy.residual =
+        energy.delivered + energy.jumps - energy.dissipated - energy.stored - energy.modulated;
     let sum = |role: Role| -> f64 {
         energy.shares.iter().filter(|s| s.role == role).map(|s| s.energy.abs()).sum()
     };
-    let sums = [sources, sum(Role::Stored), sum(Role::Dissipated), sum(Role::Modulated)];
+    let sums = [sources, *jumped, sum(Role::Stored), sum(Role::Dissipated), sum(Role::Modulated)];
     energy.turnover = sums.into_iter().fold(1e-3 * moved, f64::max);
     energy
 }
@@ -255,6 +259,12 @@ pub struct Meter {
     pub work: Vec<f64>,
     /// ∫ |e·f| dt over all bonds.
     pub moved: f64,
+    /// What stores have gained in jumps, and the sum of the magnitudes.
+    pub jumps: f64,
+    jumped: f64,
+    /// The stores whose energy is a function of what they store.
+    stores: Vec<VertexId>,
+    states: usize,
     columns: Vec<(usize, usize)>,
     /// By vertex: signed bonds into it, for junctions and two-ports.
     nodes: Vec<(VertexId, Vec<(usize, f64)>)>,
@@ -284,6 +294,14 @@ impl Meter {
         Meter {
             work: vec![0.0; graph.bonds.len()],
             moved: 0.0,
+            jumps: 0.0,
+            jumped: 0.0,
+            stores: graph
+                .vertex_ids()
+                .filter(|id| role(graph, *id) == Some(Role::Stored))
+                .filter(|id| graph.vertex(*id).bonds.iter().all(|b| carries_power(graph, *b)))
+                .collect(),
+            states: equations.states,
             columns: graph
                 .bond_ids()
                 .map(|bond| {
@@ -301,6 +319,17 @@ impl Meter {
             let part = weight * y[*e] * y[*f];
             *work += part;
             self.moved += part.abs();
+        }
+    }
+
+    /// Takes in a jump from one set of values to another.
+    pub fn jump(&mut self, graph: &BondGraph, equations: &Equations, from: &[f64], to: &[f64]) {
+        if from[..self.states] != to[..self.states] {
+            for id in &self.stores {
+                let gained = gained(graph, equations, *id, from, to).unwrap_or(0.0);
+                self.jumps += gained;
+                self.jumped += gained.abs();
+            }
         }
     }
 

@@ -12,8 +12,8 @@ mod rounding;
 
 use crate::bond::causality::Causality;
 use crate::bond::consistent;
-use crate::bond::equations::Unknown;
 use crate::bond::equations::compiled::{Compiled, Readings};
+use crate::bond::equations::{Equations, Unknown};
 use crate::bond::graph::BondGraph;
 use crate::bond::initial;
 use crate::bond::prepared::{self, Prepared};
@@ -139,6 +139,7 @@ pub fn integrate(
                             next += 1;
                         }
                     }
+                    Event::Jump { from, to, equations } => meter.jump(graph, equations, from, to),
                     Event::End(y) => end.copy_from_slice(y),
                 };
                 match march(
@@ -165,8 +166,7 @@ pub fn integrate(
     for ((least, formula), factor) in run.least[1..].iter_mut().zip(&formulas).zip(&factors) {
         *least = rounding.least(formula) / factor.abs();
     }
-    run.energy =
-        energy::balance(graph, &prepared.equations, &meter.work, meter.moved, &start, &end);
+    run.energy = energy::balance(graph, &prepared.equations, &meter, &start, &end);
     run.energy.junctions = meter.worst(graph);
     Some(run)
 }
@@ -176,6 +176,8 @@ enum Event<'a> {
     /// An accepted step within the segment `from..to`.
     /// Whether it ends on an event, and the equations with their conditions held.
     Step { step: &'a Step<'a>, from: f64, to: f64, ends: bool, compiled: &'a Compiled },
+    /// Efforts and flows were found anew, at a corner or where a condition changes.
+    Jump { from: &'a [f64], to: &'a [f64], equations: &'a Equations },
     /// The values at the end.
     End(&'a [f64]),
 }
@@ -222,12 +224,14 @@ fn march(
                 }
                 Ok(())
             };
+            let before = y.clone();
             let settled = match from > 0.0 {
                 true => equations.take(from, inside, memories.room, &mut y, &mut settle),
                 false => settle(&mut y),
             };
             settled.map_err(|trouble| Failure::Restart { t: from, trouble })?;
             sizes.see(&y);
+            report(&Event::Jump { from: &before, to: &y, equations });
         }
         let (mut t, mut turns) = (from, 0);
         while t < to {
@@ -269,9 +273,11 @@ fn march(
                 {
                     turns += 1;
                     t = reached;
+                    let before = y.clone();
                     conditions
                         .pass(compiled, structure, t, [from, to], &mut y)
                         .map_err(|trouble| Failure::Restart { t, trouble })?;
+                    report(&Event::Jump { from: &before, to: &y, equations });
                     continue;
                 }
                 // A branch may have no values past its threshold, where the other one has.
@@ -284,6 +290,7 @@ fn march(
             };
             (t, h, turns) = (ended.t, Some(ended.h), 0);
             if t < to {
+                let before = y.clone();
                 conditions
                     .pass(compiled, structure, t, [from, to], &mut y)
                     .map_err(|trouble| Failure::Restart { t, trouble })?;
@@ -293,6 +300,7 @@ fn march(
                         .map_err(|trouble| Failure::Restart { t, trouble })?;
                 }
                 sizes.see(&y);
+                report(&Event::Jump { from: &before, to: &y, equations });
                 if memories.any_delay() {
                     // What jumps here jumps again when a delay is over: the rest is segments of their own.
                     let echoes = memories.echoes(t, until);

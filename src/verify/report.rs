@@ -203,6 +203,9 @@ pub struct EnergyReport {
     pub dissipated: f64,
     /// Exchanged by modulation.
     pub modulated: f64,
+    /// Gained by stores in jumps, which no integral of a power holds: what sets them gives it.
+    #[serde(skip_serializing_if = "is_nothing")]
+    pub jumps: f64,
     /// What is left over, in parts of the sum of what each source delivers or takes.
     pub residual: f64,
     /// What the residual may be.
@@ -339,7 +342,11 @@ impl Report {
             ("dissipated", e.dissipated),
             ("stored", e.stored),
             ("modulated", e.modulated),
+            ("in by jumps", e.jumps),
         ] {
+            if name == "in by jumps" && value == 0.0 {
+                continue;
+            }
             let _ = writeln!(text, "{name:width$}  {:>12} J", short(value));
         }
         let verdict = if e.holds() { "" } else { "  does not close" };
@@ -381,6 +388,10 @@ impl Trajectory {
 /// What a junction or two-port may make or lose, in parts of what goes through it.
 const JUNCTIONS: f64 = 1e-6;
 
+fn is_nothing(value: &f64) -> bool {
+    *value == 0.0
+}
+
 impl EnergyReport {
     /// Of a run's balance.
     pub fn of(energy: &Energy, tolerance: f64) -> EnergyReport {
@@ -389,6 +400,7 @@ impl EnergyReport {
             stored: energy.stored,
             dissipated: energy.dissipated,
             modulated: energy.modulated,
+            jumps: energy.jumps,
             residual: if energy.turnover > 0.0 { energy.residual / energy.turnover } else { 0.0 },
             tolerance,
             junctions: energy.junctions.0,
@@ -412,7 +424,7 @@ impl EnergyReport {
     /// Whether the balance closes.
     pub fn holds(&self) -> bool {
         // A sum that is no number is no balance, whatever the residual says.
-        let sums = [self.delivered, self.stored, self.dissipated, self.modulated];
+        let sums = [self.delivered, self.stored, self.dissipated, self.modulated, self.jumps];
         sums.iter().all(|sum| sum.is_finite())
             && self.residual.abs() <= self.tolerance
             && self.junctions <= JUNCTIONS

@@ -189,6 +189,7 @@ fn a_balance_with_a_sum_that_is_no_number_does_not_hold() {
         stored: 0.5,
         dissipated: 0.5,
         modulated: 0.0,
+        jumps: 0.0,
         residual: 0.0,
         tolerance: 1e-6,
         junctions: 0.0,
@@ -316,4 +317,26 @@ fn what_cannot_be_solved_is_told_in_the_words_of_the_graph() {
     let all = format!("{error:?}");
     assert!(all.contains("t = 0.43"), "{all}");
     assert!(all.contains("e(g.1)") && all.contains("nothing there gives an effort"), "{all}");
+}
+
+#[track_caller]
+fn passes(text: &str) -> Report {
+    let report = of_text(text).unwrap_or_else(|d| panic!("{text}\n{d:#?}"));
+    assert!(report.passes(), "{text}\n{}", report.text());
+    report
+}
+
+#[test]
+fn what_stores_gain_in_jumps_is_in_the_balance() {
+    // A source steps across a capacitor: ½·C·U² at once, and U²/R from there on.
+    let set = "signal u = step(0.1, 0, 2)\nSe:s(u) -> 0:n\nn -> C:c(1)\nn -> R:r(3)\n\
+               simulate until 1 step 0.01\nobserve q(c), f(r)\n";
+    let energy = passes(set).energy.unwrap();
+    assert!((energy.jumps - 2.0).abs() < 1e-9, "{}", energy.jumps);
+    assert!((energy.dissipated - 1.2).abs() < 1e-8, "{}", energy.dissipated);
+    // One of two capacitors grows at each sample: charge goes over to it, and what the other loses is told.
+    let grows = "signal u = sample(ramp(0, 1), 0.1)\nsignal y = sine(0, 1, 1)\nSf:s(y) -> 0:n\n\
+                 n -> C:c(1, e0 = 1)\nn -> C:m(2 + u)\nn -> R:r(3)\nsimulate until 1 step 0.01\nobserve q(c)\n";
+    let energy = passes(grows).energy.unwrap();
+    assert!(energy.jumps < -0.1 && energy.residual.abs() < 1e-9, "{energy:#?}");
 }
