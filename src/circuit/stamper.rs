@@ -6,8 +6,8 @@ use super::stamps::{
     watched_name,
 };
 use super::{
-    self as circuit, Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe,
-    Quantity, Waveform,
+    Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
+    called,
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary, Function, slope::slope};
@@ -80,7 +80,7 @@ impl<'a> Stamper<'a> {
     pub fn new(circuit: &'a Circuit, diagnostics: &'a mut Vec<Diagnostic>) -> Stamper<'a> {
         let mut stamps = Stamps::default();
         for node in circuit.nodes.iter().skip(1) {
-            let name = circuit::called('v', &node.name);
+            let name = called('v', &node.name);
             stamps.unknowns.push(Unknown {
                 name,
                 voltage: true,
