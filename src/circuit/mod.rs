@@ -12,6 +12,7 @@ use crate::expr;
 use crate::source::Span;
 use crate::trace::fourier::Request;
 use crate::trace::measure::Measure;
+use std::sync::Arc;
 pub use sweep::{Axis, Points};
 pub use waveform::Waveform;
 
@@ -89,13 +90,16 @@ pub struct Node {
     pub span: Span,
 }
 
+/// The nodes of a device; most have two or four.
+pub type Nodes<N> = smallvec::SmallVec<[N; 4]>;
+
 /// A device between nodes.
 #[derive(Clone, Debug)]
 pub struct Device {
     /// Its name with its letter, `r_load`, `x1.r_load`, as written in the netlist.
-    pub name: String,
+    pub name: Arc<str>,
     /// Its nodes.
-    pub nodes: Vec<NodeId>,
+    pub nodes: Nodes<NodeId>,
     /// What it is.
     pub kind: DeviceKind,
     /// A typical magnitude of its current, where the netlist's header says one.

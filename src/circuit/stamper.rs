@@ -1,8 +1,8 @@
 //! Gives every node and branch its unknown, and lets devices write their terms in terms of nodes and devices.
 
-use super::devices::{self, Branch};
+use super::devices::{self, Branch, Needs};
 use super::stamps::{
-    Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Unknown, UnknownId,
+    Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Terms, Unknown, UnknownId,
     watched_name,
 };
 use super::{
@@ -11,6 +11,8 @@ use super::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::expr::{self, Binary, Function, slope::slope};
+use smallvec::smallvec;
+use std::sync::Arc;
 
 /// A circuit on its way to its stamps.
 pub struct Stamper<'a> {
@@ -22,27 +24,59 @@ pub struct Stamper<'a> {
     slots: Vec<Slots>,
 }
 
+/// An index that there may be; half as large as an `Option`, since a million devices have seven each.
+#[derive(Clone, Copy)]
+struct Index(u32);
+
+impl Index {
+    const NONE: Index = Index(u32::MAX);
+
+    fn get(self) -> Option<u32> {
+        (self.0 != u32::MAX).then_some(self.0)
+    }
+
+    fn unknown(self) -> Option<UnknownId> {
+        self.get().map(UnknownId)
+    }
+}
+
 /// What belongs to one device alone.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Slots {
-    branch: Option<UnknownId>,
-    second: Option<UnknownId>,
-    hidden: [Option<UnknownId>; 2],
-    internal: Option<UnknownId>,
-    charge: Option<u32>,
-    mode: Option<u32>,
+    branch: Index,
+    second: Index,
+    hidden: [Index; 2],
+    internal: Index,
+    charge: Index,
+    mode: Index,
+}
+
+impl Slots {
+    const NONE: Slots = Slots {
+        branch: Index::NONE,
+        second: Index::NONE,
+        hidden: [Index::NONE; 2],
+        internal: Index::NONE,
+        charge: Index::NONE,
+        mode: Index::NONE,
+    };
 }
 
 /// The current of a device in terms of the unknowns.
 #[derive(Clone, Debug)]
 pub enum Current {
     /// A sum of unknowns with factors.
-    Linear(Vec<(UnknownId, f64)>),
+    Linear(Terms),
     /// Anything else.
     Law(Law),
 }
 
 impl Current {
+    /// No current at all.
+    pub fn nothing() -> Current {
+        Current::Linear(Terms::new())
+    }
+
     /// As a law.
     pub fn law(&self) -> Law {
         match self {
@@ -78,9 +112,13 @@ impl Current {
 impl<'a> Stamper<'a> {
     /// Numbers the unknowns: nodes, internal nodes, then branches in device order; and charges and modes.
     pub fn new(circuit: &'a Circuit, diagnostics: &'a mut Vec<Diagnostic>) -> Stamper<'a> {
-        let mut stamps = Stamps::default();
+        let mut stamps = Stamps {
+            unknowns: Vec::with_capacity(circuit.nodes.len() + 16),
+            conductances: Vec::with_capacity(2 * circuit.devices.len()),
+            ..Stamps::default()
+        };
         for node in circuit.nodes.iter().skip(1) {
-            let name = called('v', &node.name);
+            let name = called('v', &node.name).into();
             stamps.unknowns.push(Unknown {
                 name,
                 voltage: true,
@@ -90,17 +128,19 @@ impl<'a> Stamper<'a> {
             });
         }
         let label = |device: &Device| DeviceLabel { name: device.name.clone(), span: device.span };
-        stamps.devices = circuit.devices.iter().map(label).collect();
+        stamps.devices = Arc::new(circuit.devices.iter().map(label).collect());
         let (read, observed) = readings(circuit);
-        let mut slots = vec![Slots::default(); circuit.devices.len()];
+        let needs = |device: &Device| (devices::row(&device.kind).needs)(&device.kind);
+        let needs: Vec<Needs> = circuit.devices.iter().map(needs).collect();
+        let mut slots = vec![Slots::NONE; circuit.devices.len()];
         for (id, device) in circuit.ids() {
-            let needs = (devices::row(&device.kind).needs)(&device.kind);
+            let needs = needs[id.0 as usize];
             let slot = &mut slots[id.0 as usize];
             if needs.internal {
                 let at = device.nodes.first().and_then(|n| circuit.nodes.get(n.0 as usize));
-                slot.internal = Some(UnknownId(stamps.unknowns.len() as u32));
+                slot.internal = Index(stamps.unknowns.len() as u32);
                 stamps.unknowns.push(Unknown {
-                    name: format!("v({}#internal)", device.name.to_lowercase()),
+                    name: format!("v({}#internal)", device.name.to_lowercase()).into(),
                     voltage: true,
                     nominal: at.and_then(|node| node.nominal),
                     device: Some(id),
@@ -108,37 +148,36 @@ impl<'a> Stamper<'a> {
                 });
             }
             if needs.charge {
-                slot.charge = Some(stamps.charges.len() as u32);
-                let (linear, into) = (vec![], vec![]);
+                slot.charge = Index(stamps.charges.len() as u32);
                 stamps.charges.push(Charge {
                     device: id,
-                    linear,
+                    linear: Terms::new(),
                     law: None,
-                    into,
+                    into: Terms::new(),
                     initial: None,
                     pinned: false,
                 });
             }
             if needs.mode {
-                slot.mode = Some(stamps.modes.len() as u32);
+                slot.mode = Index(stamps.modes.len() as u32);
                 let control = Law::number(0.0);
                 stamps.modes.push(Mode { device: id, control, on: 0.0, off: 0.0, initial: None });
             }
         }
         stamps.nodes = stamps.unknowns.len();
-        for (id, device) in circuit.ids() {
-            let k = id.0 as usize;
-            let branch = match (devices::row(&device.kind).needs)(&device.kind).branch {
+        for (k, needs) in needs.iter().enumerate() {
+            let (id, device) = (DeviceId(k as u32), &circuit.devices[k]);
+            let branch = match needs.branch {
                 Branch::Always => true,
                 Branch::Never => false,
                 Branch::WhenRead => read[k],
                 Branch::WhenObserved => read[k] || observed[k],
             };
             if branch {
-                slots[k].branch = Some(UnknownId(stamps.unknowns.len() as u32));
-                let (name, nominal, span) = (device.current_name(), device.nominal, device.span);
+                slots[k].branch = Index(stamps.unknowns.len() as u32);
+                let (nominal, span) = (device.nominal, device.span);
                 stamps.unknowns.push(Unknown {
-                    name,
+                    name: device.current_name().into(),
                     voltage: false,
                     nominal,
                     device: Some(id),
@@ -146,11 +185,12 @@ impl<'a> Stamper<'a> {
                 });
             }
         }
-        for (id, device) in circuit.ids() {
-            if (devices::row(&device.kind).needs)(&device.kind).second {
-                slots[id.0 as usize].second = Some(UnknownId(stamps.unknowns.len() as u32));
+        for (k, _) in needs.iter().enumerate().filter(|(_, needs)| needs.second) {
+            let (id, device) = (DeviceId(k as u32), &circuit.devices[k]);
+            {
+                slots[k].second = Index(stamps.unknowns.len() as u32);
                 stamps.unknowns.push(Unknown {
-                    name: format!("i({}#2)", device.name.to_lowercase()),
+                    name: format!("i({}#2)", device.name.to_lowercase()).into(),
                     voltage: false,
                     nominal: device.nominal,
                     device: Some(id),
@@ -158,12 +198,12 @@ impl<'a> Stamper<'a> {
                 });
             }
         }
-        for (id, device) in circuit.ids() {
-            let hidden = (devices::row(&device.kind).needs)(&device.kind).hidden;
-            for slot in slots[id.0 as usize].hidden.iter_mut().take(hidden) {
-                *slot = Some(UnknownId(stamps.unknowns.len() as u32));
+        for (k, needs) in needs.iter().enumerate().filter(|(_, needs)| needs.hidden > 0) {
+            let (id, device) = (DeviceId(k as u32), &circuit.devices[k]);
+            for slot in slots[k].hidden.iter_mut().take(needs.hidden) {
+                *slot = Index(stamps.unknowns.len() as u32);
                 stamps.unknowns.push(Unknown {
-                    name: format!("u({})", device.name.to_lowercase()),
+                    name: format!("u({})", device.name.to_lowercase()).into(),
                     // Like an internal node: no column of its own.
                     voltage: true,
                     nominal: None,
@@ -192,11 +232,12 @@ impl<'a> Stamper<'a> {
             self.circuit
                 .outputs
                 .iter()
-                .map(|output| (output.name.clone(), self.law(&output.expr)))
+                .map(|output| (output.name.as_str().into(), self.law(&output.expr)))
                 .collect()
         };
         let watched = self.circuit.watched.iter().enumerate();
-        let watched: Vec<_> = watched.map(|(k, expr)| (watched_name(k), self.law(expr))).collect();
+        let watched: Vec<_> =
+            watched.map(|(k, expr)| (watched_name(k).into(), self.law(expr))).collect();
         self.stamps.watched = watched.len();
         self.stamps.outputs.extend(watched);
         let of_nodes = |values: &[(NodeId, f64)]| {
@@ -257,32 +298,32 @@ impl<'a> Stamper<'a> {
 
     /// The second branch current of a device that has one.
     pub fn second(&self, id: DeviceId) -> Option<UnknownId> {
-        self.slots[id.0 as usize].second
+        self.slots[id.0 as usize].second.unknown()
     }
 
     /// A hidden unknown of a device that has as many.
     pub fn hidden(&self, id: DeviceId, k: usize) -> Option<UnknownId> {
-        self.slots[id.0 as usize].hidden.get(k).copied().flatten()
+        self.slots[id.0 as usize].hidden.get(k).and_then(|index| index.unknown())
     }
 
     /// The branch current of a device that has one.
     pub fn branch(&self, id: DeviceId) -> Option<UnknownId> {
-        self.slots[id.0 as usize].branch
+        self.slots[id.0 as usize].branch.unknown()
     }
 
     /// The internal node of a device that has one.
     pub fn internal(&self, id: DeviceId) -> Option<UnknownId> {
-        self.slots[id.0 as usize].internal
+        self.slots[id.0 as usize].internal.unknown()
     }
 
     /// The charge or flux of a device that has one.
     pub fn charge(&self, id: DeviceId) -> Option<u32> {
-        self.slots[id.0 as usize].charge
+        self.slots[id.0 as usize].charge.get()
     }
 
     /// The mode of a device that has one.
     pub fn mode(&self, id: DeviceId) -> Option<u32> {
-        self.slots[id.0 as usize].mode
+        self.slots[id.0 as usize].mode.get()
     }
 
     /// The charge or flux of a device, to write to.
@@ -318,11 +359,11 @@ impl<'a> Stamper<'a> {
 
     /// Subtracts a current from the equation of a branch: the branch's own law, moved to the left side.
     pub fn oppose(&mut self, id: DeviceId, row: UnknownId, current: Current) {
-        self.add(id, current.scaled(-1.0), vec![(row, 1.0)]);
+        self.add(id, current.scaled(-1.0), smallvec![(row, 1.0)]);
     }
 
     /// Adds a current with factors to equations.
-    pub fn add(&mut self, id: DeviceId, current: Current, into: Vec<(UnknownId, f64)>) {
+    pub fn add(&mut self, id: DeviceId, current: Current, into: Terms) {
         match current {
             Current::Linear(terms) => {
                 for (row, factor) in into {
@@ -336,20 +377,14 @@ impl<'a> Stamper<'a> {
     }
 
     /// Adds a law with factors to equations.
-    pub fn add_law(&mut self, device: DeviceId, law: Law, into: Vec<(UnknownId, f64)>) {
+    pub fn add_law(&mut self, device: DeviceId, law: Law, into: Terms) {
         if !into.is_empty() {
             self.stamps.laws.push(LawStamp { device, law, into, junction: None });
         }
     }
 
     /// Adds an independent source to right-hand sides.
-    pub fn add_source(
-        &mut self,
-        device: DeviceId,
-        waveform: &Waveform,
-        parts: Parts,
-        into: Vec<(UnknownId, f64)>,
-    ) {
+    pub fn add_source(&mut self, device: DeviceId, waveform: &Waveform, parts: Parts, into: Terms) {
         if !into.is_empty() {
             let waveform = waveform.clone();
             self.stamps.sources.push(SourceStamp { device, waveform, parts, into });
@@ -357,9 +392,9 @@ impl<'a> Stamper<'a> {
     }
 
     /// The equations of two nodes with the factors +1 and −1: what a current from the first to the second enters.
-    pub fn leaving(&self, ends: [Option<UnknownId>; 2]) -> Vec<(UnknownId, f64)> {
+    pub fn leaving(&self, ends: [Option<UnknownId>; 2]) -> Terms {
         match ends {
-            [Some(a), Some(b)] if a == b => vec![],
+            [Some(a), Some(b)] if a == b => Terms::new(),
             [a, b] => a.map(|a| (a, 1.0)).into_iter().chain(b.map(|b| (b, -1.0))).collect(),
         }
     }
@@ -367,7 +402,7 @@ impl<'a> Stamper<'a> {
     /// The current of a device from its first node to its second: its branch, or what its row says.
     pub fn current(&self, id: DeviceId) -> Current {
         match self.branch(id) {
-            Some(branch) => Current::Linear(vec![(branch, 1.0)]),
+            Some(branch) => Current::Linear(smallvec![(branch, 1.0)]),
             None => (devices::row(&self.device(id).kind).current)(self, id),
         }
     }

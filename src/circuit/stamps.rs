@@ -17,6 +17,7 @@ use super::{Circuit, DeviceId, Parts, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr;
 use crate::source::Span;
+use std::sync::Arc;
 
 /// The stamps of a circuit, by the rows of [`devices::DEVICES`]. `None` when a device makes no sense; the reasons are
 /// in `diagnostics`.
@@ -39,6 +40,9 @@ pub fn watched_name(place: usize) -> String {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct UnknownId(pub u32);
 
+/// Unknowns or equations with factors; mostly one or two.
+pub type Terms = smallvec::SmallVec<[(UnknownId, f64); 2]>;
+
 /// A law over unknowns.
 pub type Law = expr::Expr<Leaf>;
 
@@ -59,7 +63,7 @@ pub enum Leaf {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {
     /// As ngspice names it: `v(out)`, `i(l1)`.
-    pub name: String,
+    pub name: Arc<str>,
     /// Whether it is a voltage (else a current).
     pub voltage: bool,
     /// A typical magnitude, where one is known.
@@ -74,7 +78,7 @@ pub struct Unknown {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceLabel {
     /// Its name as the netlist writes it.
-    pub name: String,
+    pub name: Arc<str>,
     /// Its card.
     pub span: Span,
 }
@@ -85,11 +89,11 @@ pub struct Charge {
     /// The device that stores it.
     pub device: DeviceId,
     /// The linear part.
-    pub linear: Vec<(UnknownId, f64)>,
+    pub linear: Terms,
     /// The non-linear part.
     pub law: Option<Law>,
     /// The equations that its rate enters, with their signs.
-    pub into: Vec<(UnknownId, f64)>,
+    pub into: Terms,
     /// Q at t = 0 where the card says so (`IC=`).
     pub initial: Option<f64>,
     /// Whether an operating point holds it there.
@@ -104,7 +108,7 @@ pub struct LawStamp {
     /// The term.
     pub law: Law,
     /// The equations it enters.
-    pub into: Vec<(UnknownId, f64)>,
+    pub into: Terms,
     /// An exponential junction: Newton limits its voltage (first unknown minus second; `None` is ground).
     pub junction: Option<Junction>,
 }
@@ -130,7 +134,7 @@ pub struct SourceStamp {
     /// What it is in other analyses.
     pub parts: Parts,
     /// The equations it enters.
-    pub into: Vec<(UnknownId, f64)>,
+    pub into: Terms,
 }
 
 /// A two-state mode with hysteresis: becomes 1 when `control` rises through `on`, 0 when it falls through `off`.
@@ -158,7 +162,7 @@ pub struct MemoryStamp {
     /// What is remembered.
     pub input: Law,
     /// The right-hand sides that it enters, with factors.
-    pub into: Vec<(UnknownId, f64)>,
+    pub into: Terms,
     /// Its value at the start, where the card says so; else 0 with given initial values, or that of the operating point.
     pub initial: Option<f64>,
 }
@@ -195,18 +199,18 @@ pub struct Stamps {
     /// Modes.
     pub modes: Vec<Mode>,
     /// Output columns: name and value.
-    pub outputs: Vec<(String, Law)>,
+    pub outputs: Vec<(Arc<str>, Law)>,
     /// So many of them, the last ones, are measured and not written.
     pub watched: usize,
     /// Node voltages that `.ic` states: the values at t = 0 of charges without one of their own (`uic`; capacitors have
     /// taken theirs already), or held while the operating point is sought. The last of several wins.
-    pub initial: Vec<(UnknownId, f64)>,
+    pub initial: Terms,
     /// Node voltages of `.nodeset`, from which the search for an operating point begins.
-    pub guesses: Vec<(UnknownId, f64)>,
+    pub guesses: Terms,
     /// Node voltages that follow from sources alone, where Newton's method begins.
-    pub starts: Vec<(UnknownId, f64)>,
+    pub starts: Terms,
     /// Whether charges that cards state are held while the operating point is sought.
     pub initial_holds: bool,
     /// Names and places, indexed by [`DeviceId`].
-    pub devices: Vec<DeviceLabel>,
+    pub devices: Arc<Vec<DeviceLabel>>,
 }

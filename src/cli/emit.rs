@@ -192,7 +192,7 @@ pub fn circuit(circuit: &Circuit) -> String {
         circuit.nodes.get(id.0 as usize).map_or("?", |node| node.name.as_str()).to_string()
     };
     let device = |id: circuit::DeviceId| {
-        circuit.devices.get(id.0 as usize).map_or("?", |d| d.name.as_str()).to_string()
+        circuit.devices.get(id.0 as usize).map_or("?", |d| &*d.name).to_string()
     };
     let text = |expr: &circuit::Expr| {
         expression(expr, &|leaf| match leaf {
@@ -292,7 +292,7 @@ pub fn circuit(circuit: &Circuit) -> String {
                 Quantity::Signal { waveform } => self::waveform(waveform),
             },
         };
-        table.row([row.name.clone(), nodes.join(" "), value]);
+        table.row([row.name.to_string(), nodes.join(" "), value]);
     }
     let mut outputs = Table::new(&["output", "value"]);
     for output in &circuit.outputs {
@@ -325,7 +325,7 @@ fn waveform(waveform: &Waveform) -> String {
 
 /// Unknowns and equations, as the simulator gets them.
 pub fn system(stamps: &Stamps) -> String {
-    let unknown = |id: stamps::UnknownId| stamps.unknowns[id.0 as usize].name.clone();
+    let unknown = |id: stamps::UnknownId| stamps.unknowns[id.0 as usize].name.to_string();
     let text = |law: &stamps::Law| {
         expression(law, &|leaf| match leaf {
             stamps::Leaf::Unknown(id) => unknown(*id),
@@ -335,7 +335,7 @@ pub fn system(stamps: &Stamps) -> String {
         })
     };
     let name = |id: circuit::DeviceId| {
-        stamps.devices.get(id.0 as usize).map_or("?", |d| d.name.as_str()).to_string()
+        stamps.devices.get(id.0 as usize).map_or("?", |d| &*d.name).to_string()
     };
     let mut left = vec![vec![]; stamps.unknowns.len()];
     let mut right = vec![vec![]; stamps.unknowns.len()];

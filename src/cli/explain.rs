@@ -249,7 +249,7 @@ fn run_here(example: &Example, map: &mut SourceMap, file: FileId, d: &mut Vec<Di
     let flags = ModelFlags::from_arg_matches(&matches).ok();
     let Some(Ok(overrides)) = flags.map(|flags| flags.overrides(&mut silent)) else { return };
     match command.as_str() {
-        "check" => pipeline::check(map, file, &overrides, d),
+        "check" => drop(pipeline::check(map, file, &overrides, d)),
         "simulate" => {
             if let Some(run) = pipeline::prepare(map, file, &overrides, None, d)
                 && let Err(failure) = run.go(&mut run.trace())

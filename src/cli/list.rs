@@ -32,7 +32,7 @@ pub fn observables(
             let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, &mut d));
             for (name, _) in stamps.iter().flat_map(|s| &s.outputs[..s.outputs.len() - s.watched]) {
                 let unit = if name.starts_with("v(") { "V" } else { "A" };
-                table.row([name.clone(), unit.into()]);
+                table.row([name.to_string(), unit.into()]);
             }
         }
     }

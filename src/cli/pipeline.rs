@@ -130,20 +130,27 @@ pub fn causality(graph: &BondGraph, d: &mut Vec<Diagnostic>) -> Option<Causality
     causality
 }
 
-/// All that can be said about a text without running it.
-pub fn check(map: &mut SourceMap, file: FileId, overrides: &Overrides, d: &mut Vec<Diagnostic>) {
+/// All that can be said about a text without running it; gives the stamps and the system of a netlist, where it has come
+/// so far.
+pub fn check(
+    map: &mut SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    d: &mut Vec<Diagnostic>,
+) -> Option<(stamps::Stamps, sim::System)> {
     match language(map, file) {
         Language::Bond => {
             if let Some(graph) = graph(map, file, overrides, d) {
                 causality(&graph, d);
             }
+            None
         }
         Language::Netlist => {
-            let circuit = circuit(map, file, overrides, d);
-            let stamps = circuit.and_then(|(circuit, _)| stamps::stamp(&circuit, d));
-            if let Some(stamps) = stamps {
-                sim::compile(&stamps, d);
-            }
+            let (circuit, _) = circuit(map, file, overrides, d)?;
+            let stamps = stamps::stamp(&circuit, d)?;
+            drop(circuit);
+            let system = sim::compile(&stamps, d)?;
+            Some((stamps, system))
         }
     }
 }
@@ -305,7 +312,11 @@ impl Deck {
     /// Where a sweep names something.
     fn place(&self, name: &str) -> Span {
         let sweeps = self.netlist.cards.iter().flat_map(|card| match &card.kind {
-            CardKind::Step(sweeps) | CardKind::Analysis(Analysis::Dc(sweeps)) => &sweeps[..],
+            CardKind::Step(sweeps) => &sweeps[..],
+            CardKind::Analysis(analysis) => match &**analysis {
+                Analysis::Dc(sweeps) => &sweeps[..],
+                _ => &[],
+            },
             _ => &[],
         });
         let mut places = sweeps.filter_map(|sweep| match sweep {

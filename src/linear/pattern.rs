@@ -19,7 +19,8 @@ impl Pattern {
     pub fn from_triplets(n: usize, triplets: &[(u32, u32)]) -> (Pattern, Vec<u32>) {
         let by_row = sorted(n, (0..triplets.len() as u32).collect(), |t| triplets[t as usize].0);
         let by_column = sorted(n, by_row, |t| triplets[t as usize].1);
-        let mut pattern = Pattern { n, starts: vec![0; n + 1], rows: Vec::new() };
+        let mut pattern =
+            Pattern { n, starts: vec![0; n + 1], rows: Vec::with_capacity(triplets.len()) };
         let mut slots = vec![0; triplets.len()];
         let mut last = None;
         for t in by_column {

@@ -1,7 +1,7 @@
 //! A netlist in the words that a dialect has.
 
 use super::dialects::{Dialect, NGSPICE, Switches};
-use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Source, Waveform};
+use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Waveform};
 use crate::diagnostic::Diagnostic;
 use crate::expr::Binary;
 use crate::source::Span;
@@ -200,12 +200,10 @@ fn scope(
                 smooth(kind, parameters);
             }
             CardKind::Device(Device {
-                element:
-                    Element::VoltageSource(Source { waveform, .. })
-                    | Element::CurrentSource(Source { waveform, .. }),
+                element: Element::VoltageSource(source) | Element::CurrentSource(source),
                 ..
             }) if !dialect.phases => {
-                if let Waveform::Function { shape: Shape::Sin, arguments } = waveform {
+                if let Waveform::Function { shape: Shape::Sin, arguments } = &mut source.waveform {
                     arguments.truncate(PLAIN_SINE);
                 }
             }
@@ -241,7 +239,7 @@ fn sense(cards: &mut Vec<Card>, names: &mut Names, senses: &mut Vec<(String, Str
         let carrier = free(names, &format!("V_{carried}"));
         let node = free(names, &format!("{carried}_in"));
         let Some(minus) = device.nodes.get_mut(1) else { continue };
-        let nodes = vec![node, std::mem::replace(minus, node)];
+        let nodes = [node, std::mem::replace(minus, node)].as_slice().into();
         carriers.insert(device.name, carrier);
         senses.push((names.text(carrier).to_string(), carried.clone()));
         let element = Element::VoltageSource(Waveform::Constant(Expr::number(0.0)).into());

@@ -14,7 +14,7 @@ pub mod adapt;
 pub mod lacks;
 pub mod mast;
 
-pub use crate::circuit::Part;
+pub use crate::circuit::{Nodes, Part};
 use crate::expr;
 use crate::source::Span;
 use analysis::{Analysis, Data, Print, Sweep};
@@ -123,7 +123,7 @@ pub enum CardKind {
     /// `.four`: harmonics of the last period.
     Fourier(Fourier),
     /// `.dc`, `.ac`, `.tf` and the others.
-    Analysis(Analysis),
+    Analysis(Box<Analysis>),
     /// `.step`: everything is run at each of these values; the first of all `.step` runs fastest.
     Step(Vec<Sweep>),
     /// `.data`: values for sweeps.
@@ -198,7 +198,7 @@ pub struct Device {
     /// Its name with its letter.
     pub name: Name,
     /// Its nodes, without controlling ones.
-    pub nodes: Vec<Name>,
+    pub nodes: Nodes<Name>,
     /// What it is.
     pub element: Element,
 }
@@ -234,8 +234,8 @@ pub enum Element {
         inductors: Vec<Name>,
         coupling: Expr,
     },
-    VoltageSource(Source),
-    CurrentSource(Source),
+    VoltageSource(Box<Source>),
+    CurrentSource(Box<Source>),
     Vcvs {
         gain: Expr,
         control: [Name; 2],
@@ -257,7 +257,7 @@ pub enum Element {
         impedance: Expr,
         delay: Expr,
         /// Voltage and current of each port at the start.
-        initial: Option<[Expr; 4]>,
+        initial: Option<Box<[Expr; 4]>>,
     },
     /// `B … V=`, `E … VALUE={}`.
     BehaviouralVoltage {
@@ -307,9 +307,9 @@ pub struct Source {
     pub ac: Option<[Expr; 2]>,
 }
 
-impl From<Waveform> for Source {
-    fn from(waveform: Waveform) -> Source {
-        Source { waveform, dc: None, ac: None }
+impl From<Waveform> for Box<Source> {
+    fn from(waveform: Waveform) -> Box<Source> {
+        Box::new(Source { waveform, dc: None, ac: None })
     }
 }
 

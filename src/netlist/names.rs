@@ -16,19 +16,30 @@ pub struct Names {
     /// Open addressing, a power of two in length; `EMPTY`, or an index into `ends` and the hash, which stands here too
     /// so that names that differ are told apart without a look elsewhere.
     slots: Vec<(u32, u32)>,
+    /// The last names asked for, by the lowest bits of their hashes: cards that follow each other speak of the same ones,
+    /// and these stay in the cache where `slots` does not.
+    recent: Vec<(u32, u32)>,
 }
+
+/// So many recent names, a power of two.
+const RECENT: usize = 512;
 
 const EMPTY: (u32, u32) = (u32::MAX, 0);
 
 impl Names {
     /// The name of a text.
     pub fn intern(&mut self, text: &str) -> Name {
-        // At most three quarters full.
-        if (self.ends.len() + 1) * 4 > self.slots.len() * 3 {
+        // At most half full: rows that fall together are as long as they are.
+        if (self.ends.len() + 1) * 2 > self.slots.len() {
             self.grow();
         }
         let hash = hash(text);
-        match self.slot(text, hash) {
+        let place = hash as usize % RECENT;
+        let (last, own) = self.recent[place];
+        if last != EMPTY.0 && own == hash && equal(self.text(Name(last)), text) {
+            return Name(last);
+        }
+        let name = match self.slot(text, hash) {
             Ok(name) => name,
             Err(slot) => {
                 let name = self.ends.len() as u32;
@@ -37,7 +48,9 @@ impl Names {
                 self.slots[slot] = (name, hash);
                 Name(name)
             }
-        }
+        };
+        self.recent[place] = (name.0, hash);
+        name
     }
 
     /// A new name of a text, whether or not another is spelled alike but for case. `find` goes on giving the first, so
@@ -89,6 +102,7 @@ impl Names {
     fn grow(&mut self) {
         let size = (self.slots.len() * 2).max(64);
         self.slots = vec![EMPTY; size];
+        self.recent.resize(RECENT, EMPTY);
         for (name, (_, hash)) in self.ends.iter().enumerate() {
             let mut slot = *hash as usize & (size - 1);
             while self.slots[slot] != EMPTY {
@@ -107,19 +121,29 @@ fn equal(a: &str, b: &str) -> bool {
     }
 }
 
-/// FNV-1a over the folded text.
+/// Names that are counted through (`n17`, `n18`) stand beside each other, this many in a row, since cards mostly speak of
+/// them in their order: a block in the cache holds them all.
+const ROW: u32 = 16;
+
+/// FNV-1a over the folded text but for the number that it ends with; of that the higher part is mixed in, and the lower
+/// one says where in the row.
 fn hash(text: &str) -> u32 {
     let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    let digits = text.bytes().rev().take(9).take_while(u8::is_ascii_digit).count();
+    let (word, number) = text.split_at(text.len() - digits);
+    let number = number.bytes().fold(0, |number, digit| 10 * number + u32::from(digit - b'0'));
     let start = 0xcbf2_9ce4_8422_2325;
-    let hash = if text.is_ascii() {
-        text.bytes().fold(start, |hash, byte| mix(hash, byte.to_ascii_lowercase()))
+    let hash = if word.is_ascii() {
+        word.bytes().fold(start, |hash, byte| mix(hash, byte.to_ascii_lowercase()))
     } else {
         let mut bytes = [0; 4];
-        text.chars()
+        word.chars()
             .flat_map(char::to_lowercase)
             .fold(start, |hash, letter| letter.encode_utf8(&mut bytes).bytes().fold(hash, mix))
     };
-    (hash ^ (hash >> 32)) as u32
+    // The last multiplication spreads only upwards, and the lowest bits are those that count.
+    let hash = (hash ^ u64::from(number / ROW)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    ((hash >> 32) as u32 & !(ROW - 1)) | (number % ROW)
 }
 
 #[cfg(test)]

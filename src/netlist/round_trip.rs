@@ -97,7 +97,7 @@ fn sample(values: &[f64], law: u64) -> Netlist {
     let mut number = || Expr::number(numbers.next().unwrap_or(1.0));
     let mut device = |name: &str, element: Element, comment: Option<String>| {
         let name = names.intern(name);
-        let kind = CardKind::Device(Device { name, nodes: vec![a, b], element });
+        let kind = CardKind::Device(Device { name, nodes: [a, b].as_slice().into(), element });
         cards.push(Card { kind, span: Span::NONE, comment });
     };
     device("R_1", Element::Resistor { value: number() }, Some("model.bg:7  R:one".into()));
@@ -110,11 +110,11 @@ fn sample(values: &[f64], law: u64) -> Netlist {
     let waveform = Waveform::Function { shape: Shape::Pwl, arguments };
     device(
         "V_1",
-        Element::VoltageSource(Source {
+        Element::VoltageSource(Box::new(Source {
             waveform,
             dc: Some(number()),
             ac: Some([number(), number()]),
-        }),
+        })),
         None,
     );
     device("I_1", Element::CurrentSource(Waveform::Constant(number()).into()), None);
@@ -123,7 +123,7 @@ fn sample(values: &[f64], law: u64) -> Netlist {
     let law = tree(law, a, b, &reading, &mut number, 0);
     let name = names.intern("B_1");
     let element = Element::BehaviouralCurrent { law };
-    let kind = CardKind::Device(Device { name, nodes: vec![a, ground], element });
+    let kind = CardKind::Device(Device { name, nodes: [a, ground].as_slice().into(), element });
     cards.push(Card { kind, span: Span::NONE, comment: None });
     Netlist {
         title: "a sample".into(),

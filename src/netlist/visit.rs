@@ -85,7 +85,7 @@ pub(super) fn device_mut(device: &mut Device, visit: &mut dyn FnMut(&mut Expr)) 
         Element::Line { impedance, delay, initial } => {
             visit(impedance);
             visit(delay);
-            initial.iter_mut().flatten().for_each(visit);
+            initial.iter_mut().flat_map(|values| values.iter_mut()).for_each(visit);
         }
         Element::BehaviouralVoltage { law } | Element::BehaviouralCurrent { law } => visit(law),
         Element::Charge { law, initial } | Element::Flux { law, initial } => {

@@ -502,7 +502,7 @@ mod tests {
         let [a, b, r, v, e, p] = ["a", "b", "R_1", "V_1", "E_1", "Rload"].map(|n| names.intern(n));
         let ground = names.intern("0");
         let device = |name, nodes: [Name; 2], element, comment: &str| Card {
-            kind: CardKind::Device(Device { name, nodes: nodes.to_vec(), element }),
+            kind: CardKind::Device(Device { name, nodes: nodes.as_slice().into(), element }),
             span: Span::NONE,
             comment: (!comment.is_empty()).then(|| comment.to_string()),
         };

@@ -64,7 +64,7 @@ pub const ANALYSES: &[Row] = &[
             let axes = axes(analysis);
             let first = axes.first().and_then(|axis| axis.names.first());
             // Nothing says what unit a parameter has.
-            first.map(|name| (name.clone(), "")).into_iter().chain(outputs(stamps)).collect()
+            first.map(|name| (name.to_string(), "")).into_iter().chain(outputs(stamps)).collect()
         },
         run: dc::dc,
     },
@@ -116,7 +116,7 @@ pub fn row(name: &str) -> Option<&'static Row> {
 }
 
 fn outputs(stamps: &Stamps) -> Vec<Column> {
-    stamps.outputs.iter().map(|(name, _)| (name.clone(), "")).collect()
+    stamps.outputs.iter().map(|(name, _)| (name.to_string(), "")).collect()
 }
 
 /// The axes of a sweep; none for anything else.

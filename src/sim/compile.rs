@@ -4,14 +4,14 @@ use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
 use super::laws::LawSet;
 use super::memory::MemoryData;
+use super::plans::{self, Plans};
 use super::reduce;
 use super::structure;
-use super::system::{Guard, LawGroup, MatrixPlan, ModeData, Place, Rows, Source, System, Target};
+use super::system::{Guard, LawGroup, ModeData, Rows, Source, System, Target};
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Dag, NodeId};
-use crate::linear::Pattern;
+use crate::expr::{Dag, Node, NodeId};
 use crate::source::Span;
 use std::collections::BTreeMap;
 
@@ -30,6 +30,8 @@ pub(super) fn compile_linear(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option
 fn compile_for(stamps: &Stamps, linear: bool, d: &mut Vec<Diagnostic>) -> Option<System> {
     let mut builder = Builder::new(stamps);
     builder.linear = linear;
+    builder.charge_entries.reserve(2 * stamps.charges.len());
+    builder.rate_entries.reserve(2 * stamps.charges.len());
     for (k, charge) in stamps.charges.iter().enumerate() {
         for (unknown, value) in &charge.linear {
             builder.charge_entries.push((k as u32, unknown.0, *value));
@@ -126,7 +128,7 @@ impl<'a> Builder<'a> {
         let label = device.and_then(|d| self.stamps.devices.get(d.0 as usize));
         self.rate_unknowns.insert(k, self.unknowns.len() as u32);
         self.unknowns.push(Unknown {
-            name: format!("d/dt({})", label.map_or("?", |label| label.name.as_str())),
+            name: format!("d/dt({})", label.map_or("?", |label| &*label.name)).into(),
             voltage: false,
             nominal: None,
             device,
@@ -328,9 +330,15 @@ impl<'a> Builder<'a> {
         let conductances = Rows::new(n, &self.conductances);
         let charge_rows = Rows::new(charges, &self.charge_entries);
         let rates = Rows::new(charges, &self.rate_entries);
-        let dynamic = plan_dynamic(n, time, &conductances, &charge_rows, &rates, &mut groups);
-        let (frozen, node_slots, free_slots) =
-            plan_frozen(n, stamps.nodes, &conductances, &charge_rows, &rates, &mut groups);
+        let parts = plans::Parts {
+            n,
+            nodes: stamps.nodes,
+            time,
+            conductances: &conductances,
+            charges: &charge_rows,
+            rates: &rates,
+        };
+        let Plans { dynamic, frozen, node_slots, free_slots } = plans::plan(&parts, &mut groups);
 
         let (modes, controls) = self.modes();
         let mode_slots = self.mode_slots();
@@ -343,8 +351,19 @@ impl<'a> Builder<'a> {
         let mut conditions = std::mem::take(&mut self.conditions);
         let first_rate = Some((time + 1 + mode_slots) as u32);
         let inputs = |leaf: &Leaf| self.input(leaf, first_rate);
-        let nodes: Vec<NodeId> =
-            columns.iter().map(|(_, law)| conditions.add_output(&mut dag, law, &inputs)).collect();
+        let (mut plain_outputs, mut law_columns, mut nodes) = (vec![], vec![], vec![]);
+        for (column, (_, law)) in columns.iter().enumerate() {
+            match &*law.node {
+                // Most columns are unknowns as they are.
+                Node::Leaf(Leaf::Unknown(k)) if !self.linear => {
+                    plain_outputs.push((column as u32, k.0));
+                }
+                _ => {
+                    law_columns.push(column as u32);
+                    nodes.push(conditions.add_output(&mut dag, law, &inputs));
+                }
+            }
+        }
         let output_laws = match self.linear {
             true => LawSet::new(&mut dag, &nodes, (time + 1 + mode_slots + charges) as u32),
             false => LawSet::without_derivatives(&dag, &nodes),
@@ -411,6 +430,8 @@ impl<'a> Builder<'a> {
             modes,
             mode_slots,
             controls,
+            plain_outputs,
+            law_columns,
             output_laws,
             memories,
             memory_inputs,
@@ -464,144 +485,4 @@ impl Builder<'_> {
         self.conditions = conditions;
         (modes, controls)
     }
-}
-
-/// Places of a matrix while its pattern is collected.
-#[derive(Default)]
-struct Plan {
-    triplets: Vec<(u32, u32)>,
-}
-
-impl Plan {
-    /// Asks for a place; its number stands for the slot until the pattern is known.
-    fn ask(&mut self, row: usize, column: usize) -> u32 {
-        self.triplets.push((row as u32, column as u32));
-        self.triplets.len() as u32 - 1
-    }
-}
-
-/// W(α) = G + f' + α·A·(C + q').
-fn plan_dynamic(
-    n: usize,
-    time: usize,
-    conductances: &Rows,
-    charges: &Rows,
-    rates: &Rows,
-    groups: &mut [LawGroup],
-) -> MatrixPlan {
-    let mut plan = Plan::default();
-    let mut fixed: Vec<(u32, f64)> = vec![];
-    for (row, column, value) in conductances.triplets() {
-        fixed.push((plan.ask(row, column), value));
-    }
-    let mut storage: Vec<Place> = vec![];
-    for (k, equation, sign) in rates.triplets() {
-        for (column, value) in charges.row(k) {
-            let slot = plan.ask(equation, column);
-            storage.push(Place { partial: k as u32, slot, factor: sign * value });
-        }
-    }
-    for group in groups.iter_mut() {
-        let LawGroup { laws, targets, dynamic, dynamic_charge, by_time, charge_slopes, .. } = group;
-        for (o, target) in targets.iter().enumerate() {
-            for p in laws.row(o) {
-                let (input, partial) = (laws.input(p), p as u32);
-                match target {
-                    Target::Equations(into) => {
-                        for (row, factor) in into {
-                            if input == time {
-                                by_time.push((partial, *row, *factor));
-                            } else {
-                                let slot = plan.ask(*row as usize, input);
-                                dynamic.push(Place { partial, slot, factor: *factor });
-                            }
-                        }
-                    }
-                    Target::Charge(k) if input < n => {
-                        charge_slopes.push((partial, *k, input as u32));
-                        for (row, factor) in rates.row(*k as usize) {
-                            let slot = plan.ask(row, input);
-                            dynamic_charge.push(Place { partial, slot, factor });
-                        }
-                    }
-                    Target::Charge(_) => {}
-                }
-            }
-        }
-    }
-    let (pattern, slots) = Pattern::from_triplets(n, &plan.triplets);
-    let settle = |place: &mut Place| place.slot = slots[place.slot as usize];
-    for group in groups {
-        group.dynamic.iter_mut().for_each(settle);
-        group.dynamic_charge.iter_mut().for_each(settle);
-    }
-    storage.iter_mut().for_each(settle);
-    let fixed = settled(&pattern, &slots, &fixed);
-    MatrixPlan { pattern, fixed, storage }
-}
-
-/// The frozen network, with the slots of the nodes' diagonal entries and of each charge's own w.
-fn plan_frozen(
-    n: usize,
-    nodes: usize,
-    conductances: &Rows,
-    charges: &Rows,
-    rates: &Rows,
-    groups: &mut [LawGroup],
-) -> (MatrixPlan, Vec<u32>, Vec<u32>) {
-    let mut plan = Plan::default();
-    let mut fixed: Vec<(u32, f64)> = vec![];
-    for (row, column, value) in conductances.triplets() {
-        fixed.push((plan.ask(row, column), value));
-    }
-    for (k, equation, sign) in rates.triplets() {
-        fixed.push((plan.ask(equation, n + k), sign));
-    }
-    let mut storage: Vec<Place> = vec![];
-    for (k, column, value) in charges.triplets() {
-        let slot = plan.ask(n + k, column);
-        storage.push(Place { partial: k as u32, slot, factor: value });
-    }
-    for group in groups.iter_mut() {
-        let LawGroup { laws, targets, frozen, frozen_charge, .. } = group;
-        for (o, target) in targets.iter().enumerate() {
-            for p in laws.row(o) {
-                let (input, partial) = (laws.input(p), p as u32);
-                match target {
-                    _ if input >= n => {}
-                    Target::Equations(into) => {
-                        for (row, factor) in into {
-                            let slot = plan.ask(*row as usize, input);
-                            frozen.push(Place { partial, slot, factor: *factor });
-                        }
-                    }
-                    Target::Charge(k) => {
-                        let slot = plan.ask(n + *k as usize, input);
-                        frozen_charge.push((*k, Place { partial, slot, factor: 1.0 }));
-                    }
-                }
-            }
-        }
-    }
-    let node_slots: Vec<u32> = (0..nodes).map(|node| plan.ask(node, node)).collect();
-    let count = charges.starts.len() - 1;
-    let free_slots: Vec<u32> = (0..count).map(|k| plan.ask(n + k, n + k)).collect();
-    let (pattern, slots) = Pattern::from_triplets(n + count, &plan.triplets);
-    let settle = |place: &mut Place| place.slot = slots[place.slot as usize];
-    for group in groups {
-        group.frozen.iter_mut().for_each(settle);
-        group.frozen_charge.iter_mut().for_each(|(_, place)| settle(place));
-    }
-    storage.iter_mut().for_each(settle);
-    let fixed = settled(&pattern, &slots, &fixed);
-    let settle_all = |asked: Vec<u32>| asked.iter().map(|a| slots[*a as usize]).collect();
-    (MatrixPlan { pattern, fixed, storage }, settle_all(node_slots), settle_all(free_slots))
-}
-
-fn settled(pattern: &Pattern, slots: &[u32], fixed: &[(u32, f64)]) -> Vec<f64> {
-    let mut values = vec![0.0; pattern.len()];
-    for (asked, value) in fixed {
-        values[slots[*asked as usize] as usize] += value;
-    }
-    values
 }

@@ -86,6 +86,20 @@ impl LawSet {
         }
     }
 
+    /// Values of all laws, each put where `places` says.
+    pub fn scatter(
+        &self,
+        inputs: &[f64],
+        registers: &mut Registers,
+        places: &[u32],
+        out: &mut [f64],
+    ) {
+        self.values.run(inputs, &mut registers.values);
+        for (place, value) in places.iter().zip(self.values.outputs(&registers.values)) {
+            out[*place as usize] = value;
+        }
+    }
+
     /// Values and partial derivatives of all laws.
     pub fn full(
         &self,

@@ -108,7 +108,7 @@ impl Linear {
         });
         let outputs = network.output_slopes(x).into_iter().zip(&system.outputs);
         let outputs =
-            outputs.map(|((terms, rates), name)| Reading { name: name.clone(), terms, rates });
+            outputs.map(|((terms, rates), name)| Reading { name: name.to_string(), terms, rates });
         Ok(Linear {
             unknowns: system.unknowns.clone(),
             conductances,

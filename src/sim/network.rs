@@ -100,12 +100,17 @@ pub(crate) struct Network<'a> {
     frozen: Matrix,
     /// α of the factorised dynamic matrix, where it depends on nothing else.
     factored_alpha: Option<f64>,
+    /// α of the factors at hand, whatever else they depend on.
+    stage_alpha: Option<f64>,
     /// The charges held in the factorised frozen matrix, where it depends on nothing else; empty where it does.
     factored_held: Vec<bool>,
 }
 
 /// Factors serve for an α that differs by no more than this part: equal steps differ in their last digits.
 const SAME_ALPHA: f64 = 1e-12;
+
+/// In iterations that converge with other factors too, for one that differs by this part.
+const ABOUT_SAME: f64 = 1e-6;
 
 impl<'a> Network<'a> {
     /// At time `t` of a run that ends at `stop`, all modes 0.
@@ -139,6 +144,7 @@ impl<'a> Network<'a> {
             dynamic: Matrix::new(&system.dynamic),
             frozen: Matrix::new(&system.frozen),
             factored_alpha: None,
+            stage_alpha: None,
             factored_held: vec![],
         }
     }
@@ -445,7 +451,13 @@ impl<'a> Network<'a> {
         let result = self.dynamic.factorise(plan, &mut self.statistics);
         let constant = result.is_ok() && self.groups.is_empty();
         self.factored_alpha = constant.then_some(alpha);
+        self.stage_alpha = result.is_ok().then_some(alpha);
         result
+    }
+
+    /// Whether the factors at hand are those of about the same α.
+    pub fn factors_serve(&self, alpha: f64) -> bool {
+        self.stage_alpha.is_some_and(|known| (known - alpha).abs() <= ABOUT_SAME * alpha)
     }
 
     /// Solves W·y = y in place.
@@ -533,6 +545,7 @@ impl<'a> Network<'a> {
     /// Forgets that the factors at hand are of the present matrix.
     pub fn forget_constant_factors(&mut self) {
         self.factored_alpha = None;
+        self.stage_alpha = None;
         self.factored_held.clear();
     }
 
@@ -564,10 +577,18 @@ impl<'a> Network<'a> {
 
     /// Output columns.
     pub fn outputs(&mut self, x: &[f64], w: &[f64], t: f64, out: &mut [f64]) {
+        let system = self.system;
+        for (column, unknown) in &system.plain_outputs {
+            out[*column as usize] = x[*unknown as usize];
+        }
+        if system.law_columns.is_empty() {
+            return;
+        }
         self.set_inputs(x, t);
         let from = self.inputs.len() - w.len();
         self.inputs[from..].copy_from_slice(w);
-        self.system.output_laws.values(&self.inputs, &mut self.output_registers, out);
+        let columns = &system.law_columns;
+        system.output_laws.scatter(&self.inputs, &mut self.output_registers, columns, out);
     }
 
     /// G + f' and A·(C + q') as triplets, with the derivatives of the last linearisation.

@@ -1,5 +1,6 @@
 //! Newton's method on a step's equations and on the frozen network, with tests of both update and residual.
 
+use super::near::{self, Near};
 use super::network::Network;
 use super::search::Sought;
 use crate::circuit::DeviceId;
@@ -22,11 +23,18 @@ pub(crate) enum Cut {
 #[derive(Debug)]
 pub(crate) struct Scratch {
     pub residual: Vec<f64>,
-    rates: Vec<f64>,
+    pub rates: Vec<f64>,
     pub sizes: Vec<f64>,
     update: Vec<f64>,
     /// The update before.
     before: Vec<f64>,
+    /// What the second update of a stage is of the first one's square, both weighted, as far as is known: with it, one
+    /// iteration tells how far off it is, and no second one need confirm it.
+    bend: f64,
+    /// Stages since that has been measured.
+    age: u32,
+    /// What is known of the factors at hand.
+    pub near: Near,
 }
 
 impl Scratch {
@@ -37,7 +45,16 @@ impl Scratch {
             sizes: vec![0.0; n + charges],
             update: vec![0.0; n + charges],
             before: vec![0.0; n + charges],
+            bend: f64::INFINITY,
+            age: 0,
+            near: Near::UNKNOWN,
         }
+    }
+
+    /// What was measured of the equations no longer holds.
+    pub fn forget_bend(&mut self) {
+        self.bend = f64::INFINITY;
+        self.near = Near::UNKNOWN;
     }
 }
 
@@ -61,6 +78,15 @@ const RESIDUAL: f64 = 1e-6;
 /// A part of an unknown's floor that counts as nothing: with [`RESIDUAL`], a billionth of the floor.
 const UNNOTICED: f64 = 1e-3;
 
+/// After so many stages it is measured again how fast iterations converge.
+pub(super) const MEASURED_AGAIN: u32 = 8;
+
+/// What was measured may have become larger by this factor since.
+pub(super) const GROWN: f64 = 4.0;
+
+/// The largest first update that no second one confirms: a kink in between would leave no more than about this much.
+const NEAR: f64 = 0.5;
+
 /// Most iterations of one step.
 const MOST: u64 = 12;
 
@@ -71,8 +97,11 @@ pub(crate) struct Stage<'a> {
     pub beta: &'a [f64],
     /// Weights of the update test; infinite where an unknown is not tested.
     pub weights: &'a [f64],
-    /// Largest weighted error of iteration.
+    /// Largest weighted error of iteration, where the residual is tested too.
     pub tolerance: f64,
+    /// Largest weighted error of iteration without such a test: a part of what the method itself errs by, since over
+    /// thousands of steps errors of one sign would add up.
+    pub unconfirmed: f64,
 }
 
 /// Solves a stage from the guess in `x`; leaves Q(x) in `q`, and the last factors of W(α) in the network.
@@ -85,6 +114,9 @@ pub(crate) fn solve_stage(
 ) -> Result<(), Cut> {
     let n = x.len();
     let linear = network.system.is_linear();
+    if !linear && near::solve(network, stage, x, q, scratch) {
+        return Ok(());
+    }
     let mut before = f64::INFINITY;
     let mut damping = false;
     for iteration in 0..MOST {
@@ -98,6 +130,7 @@ pub(crate) fn solve_stage(
             return Ok(());
         }
         network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
+        scratch.near.forget();
         network.solve_dynamic(residual);
         let last = &mut scratch.before[..n];
         let damped = damping && swings(residual, last, stage.weights);
@@ -116,9 +149,26 @@ pub(crate) fn solve_stage(
             return Ok(());
         }
         let rate = if iteration == 0 { 0.0 } else { update / before };
+        if iteration == 0 {
+            scratch.age += 1;
+            let left = GROWN * scratch.bend * update * update;
+            let known = left <= stage.unconfirmed && scratch.age < MEASURED_AGAIN;
+            if known && update <= NEAR && !limited {
+                // Charges go with the linear terms, as the equations just solved have them.
+                for dx in &mut scratch.residual[..n] {
+                    *dx = -*dx;
+                }
+                network.add_charge_change(1.0, &scratch.residual[..n], q);
+                return Ok(());
+            }
+        } else if iteration == 1 && before > 0.0 {
+            scratch.bend = update / (before * before);
+            scratch.age = 0;
+        }
         damping = rate >= 0.5;
         let done = match iteration {
-            0 => update <= 0.1 * stage.tolerance,
+            // Once it is measured how fast iterations converge, the next stages need not be confirmed.
+            0 => update <= 0.1 * stage.tolerance && (scratch.bend.is_finite() || update == 0.0),
             _ => rate < 1.0 && update * rate / (1.0 - rate) <= stage.tolerance,
         };
         before = update;
@@ -131,6 +181,7 @@ pub(crate) fn solve_stage(
         network.evaluate(x, stage.t);
         network.charges(x, q);
         if residual_is_small(network, stage, x, q, scratch) {
+            scratch.age = 0;
             return Ok(());
         }
     }
@@ -140,7 +191,7 @@ pub(crate) fn solve_stage(
     Err(Cut::NoConvergence { worst })
 }
 
-fn stage_residual(
+pub(super) fn stage_residual(
     network: &Network,
     stage: &Stage,
     x: &[f64],

@@ -39,6 +39,9 @@ impl From<io::Error> for Stopped {
     }
 }
 
+/// A piece of a step: its right end, how often it has been halved, and how far its double was from a line.
+type Piece = (Vec<f64>, u32, f64);
+
 /// Where rows go, and which are still to come.
 pub(crate) struct Rows<'a> {
     sink: &'a mut dyn Sink,
@@ -59,6 +62,11 @@ pub(crate) struct Rows<'a> {
     /// The row at the left end of a step, and extremes of each column so far.
     left: Vec<f64>,
     middle: Vec<f64>,
+    /// The row at the right end.
+    right: Vec<f64>,
+    /// Pieces of a step that are still to come, and rows that wait for use.
+    pile: Vec<Piece>,
+    spare: Vec<Vec<f64>>,
     low: Vec<f64>,
     high: Vec<f64>,
     inside: Inside,
@@ -81,6 +89,9 @@ impl<'a> Rows<'a> {
             row: vec![0.0; columns + 1],
             left: vec![0.0; columns + 1],
             middle: vec![0.0; columns + 1],
+            right: vec![0.0; columns + 1],
+            pile: Vec::with_capacity(MOST_HALVED as usize + 2),
+            spare: (0..MOST_HALVED + 2).map(|_| vec![0.0; columns + 1]).collect(),
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
             inside: Inside::new(network),
@@ -178,17 +189,7 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
-        self.inside.begin();
-        self.inside.point.copy_from(state);
-        self.inside.finish_point(
-            network,
-            state.t,
-            index2 || !network.system.output_rates,
-            weights,
-            work,
-        )?;
-        self.inside.point.t = state.t;
-        self.evaluate(network, time);
+        self.at_end(network, state, time, index2, weights, work)?;
         if time >= self.start - self.slack {
             self.send_step(network)?;
         }
@@ -211,22 +212,21 @@ impl<'a> Rows<'a> {
         if to.t < self.start {
             return Ok(());
         }
-        self.inside.point.copy_from(to);
-        self.inside.finish_point(
-            network,
-            to.t,
-            index2 || !network.system.output_rates,
-            weights,
-            work,
-        )?;
-        self.evaluate(network, to.t);
+        self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
-        // Pieces are halved from the left; what is still to come lies on a pile: its right end, how often it has been
-        // halved, and how far its double was from a line.
+        if self.is_straight(network, from, to, index2, work) {
+            return Ok(());
+        }
+        std::mem::swap(&mut self.row, &mut self.right);
+        // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;
-        let mut pile = vec![(self.row.clone(), 0, f64::INFINITY)];
-        while let Some((right, halved, before)) = pile.pop() {
+        while let Some((last, ..)) = self.pile.pop() {
+            self.spare.push(last);
+        }
+        let right = self.copy_of_row();
+        self.pile.push((right, 0, f64::INFINITY));
+        while let Some((right, halved, before)) = self.pile.pop() {
             let span = right[0] - left[0];
             let mut off = 0.0;
             if halved < MOST_HALVED && span > self.slack {
@@ -249,18 +249,95 @@ impl<'a> Rows<'a> {
             // What does not become straighter is rounding.
             let straight = off <= STRAIGHT || (halved > 4 && off >= before);
             if !straight {
-                let middle = self.row.clone();
-                pile.push((right, halved + 1, off));
-                pile.push((middle, halved + 1, off));
+                let middle = self.copy_of_row();
+                self.pile.push((right, halved + 1, off));
+                self.pile.push((middle, halved + 1, off));
                 continue;
             }
             left.copy_from_slice(&right);
-            if !pile.is_empty() && left[0] >= self.start - self.slack {
+            self.spare.push(right);
+            if !self.pile.is_empty() && left[0] >= self.start - self.slack {
                 self.row.copy_from_slice(&left);
                 self.send_step(network)?;
             }
         }
         self.left = left;
+        Ok(())
+    }
+
+    /// The present row, in a vector that waits for use.
+    fn copy_of_row(&mut self) -> Vec<f64> {
+        match self.spare.pop() {
+            Some(mut row) => {
+                row.copy_from_slice(&self.row);
+                row
+            }
+            None => self.row.clone(),
+        }
+    }
+
+    /// Whether what the step's own polynomials make of the columns is straight without doubt, so that nothing need be solved
+    /// within the step. Leaves the present row, the step's end, in `self.right`.
+    fn is_straight(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        index2: bool,
+        work: &mut Work,
+    ) -> bool {
+        /// A part of what a line may be off by.
+        const SURE: f64 = 0.5;
+        // Parabolas through stages say little of junctions.
+        self.right.copy_from_slice(&self.row);
+        if index2 || work.dense.by_unknowns || network.system.output_rates {
+            return false;
+        }
+        let right = std::mem::take(&mut self.right);
+        let left = std::mem::take(&mut self.left);
+        let mut off: f64 = 0.0;
+        let plain = network.system.law_columns.is_empty();
+        for theta in [0.5, 0.25, 0.75] {
+            if plain {
+                for (column, unknown) in &network.system.plain_outputs {
+                    let value = work.dense.unknown(*unknown as usize, theta, from, to);
+                    self.row[*column as usize + 1] = value;
+                }
+            } else {
+                let time = from.t + theta * (to.t - from.t);
+                work.dense.unknowns(theta, from, to, &mut self.inside.point.x);
+                self.inside.point.t = time;
+                self.evaluate(network, time);
+            }
+            off = off.max(self.off_line(theta, &left, &right));
+            if off.is_nan() || off > SURE * STRAIGHT {
+                break;
+            }
+        }
+        self.left = left;
+        self.right = right;
+        off <= SURE * STRAIGHT
+    }
+
+    /// Makes the row of a step's end, headed by a time.
+    fn at_end(
+        &mut self,
+        network: &mut Network,
+        state: &State,
+        time: f64,
+        index2: bool,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> Result<(), Stopped> {
+        self.inside.begin();
+        if index2 || !network.system.output_rates {
+            self.row[0] = time;
+            network.outputs(&state.x, &state.w, state.t, &mut self.row[1..]);
+            return Ok(());
+        }
+        self.inside.point.copy_from(state);
+        self.inside.finish_point(network, state.t, false, weights, work)?;
+        self.evaluate(network, time);
         Ok(())
     }
 

@@ -1,11 +1,13 @@
 //! A transient run: steps of controlled error from corner to corner, restarts, events, rows.
 
+mod bound;
 mod crossing;
 pub(super) mod past;
 mod restart;
 mod rows;
 mod trouble;
 
+use self::bound::Bound;
 use self::crossing::{Crossed, Located, Search};
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
@@ -124,6 +126,10 @@ const LAYER: f64 = 1e-9;
 /// The error of a step that lost its way between its ends: less than half of it is tried next.
 const LOST: f64 = 60.0;
 
+/// Iterations may leave this part of a step's error, and of none less than this part of its tolerance.
+const UNCONFIRMED: f64 = 0.05;
+const NEGLIGIBLE: f64 = 1e-6;
+
 fn stored(system: &System) -> Vec<u32> {
     let columns = system.charges.triplets().filter(|(.., value)| *value != 0.0);
     let mut stored: Vec<u32> = columns.map(|(_, column, _)| column as u32).collect();
@@ -174,6 +180,8 @@ struct Run<'a> {
     /// The method to come back to, and after how many steps; 0 where there is nothing to come back from.
     home: Method,
     detour: u32,
+    /// Whether the step limit makes another method the cheaper one.
+    bound: Bound,
     /// Events since a moment, to see when they pile up.
     crowd: (f64, u32),
 }
@@ -238,6 +246,7 @@ impl<'a> Run<'a> {
             smoothed: false,
             home: settings.method,
             detour: 0,
+            bound: Bound::default(),
             crowd: (0.0, 0),
             network,
             settings,
@@ -333,7 +342,7 @@ impl<'a> Run<'a> {
                 Ok(error) => {
                     self.network.statistics.rejected.error += 1;
                     cuts.note(h, Reason::Error(self.worst_error(), error));
-                    h *= (0.9 * libm::pow(error, -1.0 / power)).clamp(0.1, 0.9);
+                    h *= (0.9 * methods::growth(error, power)).clamp(0.1, 0.9);
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
                 Err(Cut::NonFinite { .. }) if self.slope_by_time_is_infinite() => {
@@ -431,15 +440,17 @@ impl<'a> Run<'a> {
         self.network.statistics.accepted += 1;
         self.fresh = false;
         self.end_detour();
+        self.suit_limit(error, h);
+        self.work.unconfirmed = UNCONFIRMED * error.max(NEGLIGIBLE);
         let most = match self.method {
             Method::Gear2 => 2.0,
             _ => 6.0,
         };
         let size = error.max(1e-12);
-        let mut factor = 0.9 * libm::pow(size, -1.0 / power);
+        let mut factor = 0.9 * methods::growth(size, power);
         if let Some((last_error, last_h)) = self.last {
             // Gustafsson's predictive controller: the error of the last step says how the solution changes.
-            let trend = h / last_h * libm::pow(last_error / size, 1.0 / power);
+            let trend = h / last_h * methods::growth(size / last_error, power);
             factor = factor.min(factor * trend.max(0.2)).max(0.2);
         }
         let factor = factor.clamp(0.2, if failed { 1.0 } else { most });
@@ -458,7 +469,7 @@ impl<'a> Run<'a> {
             outcome.map_err(|stopped| self.row_failure(stopped))?;
         }
         self.remember()?;
-        self.work.remember(&self.state);
+        self.work.history.remember(&self.state);
         self.work.linearised = false;
         std::mem::swap(&mut self.state, &mut self.next);
         if self.watches {

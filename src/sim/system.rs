@@ -18,6 +18,7 @@ use crate::circuit::{DeviceId, Parts, Waveform};
 use crate::linear::Pattern;
 use crate::source::Span;
 use std::fmt;
+use std::sync::Arc;
 
 /// A sparse list of rows: row `r` holds the entries `starts[r]..starts[r + 1]`.
 #[derive(Clone, Debug, Default)]
@@ -209,11 +210,11 @@ pub struct System {
     /// Number of node voltages.
     pub nodes: usize,
     /// Output columns.
-    pub outputs: Vec<String>,
+    pub outputs: Vec<Arc<str>>,
     /// So many of them, the last ones, are measured and not written.
     pub watched: usize,
     /// Names and places of the devices.
-    pub devices: Vec<DeviceLabel>,
+    pub devices: Arc<Vec<DeviceLabel>>,
     /// What its parts are called in the text that it was made of.
     pub spoken: crate::circuit::Spoken,
     pub(crate) charge_devices: Vec<DeviceId>,
@@ -251,6 +252,10 @@ pub struct System {
     pub(crate) mode_slots: usize,
     /// Guards of the modes, two values each.
     pub(crate) controls: LawSet,
+    /// Output columns that are unknowns as they are: column and unknown.
+    pub(crate) plain_outputs: Vec<(u32, u32)>,
+    /// The columns of the other outputs, and their laws.
+    pub(crate) law_columns: Vec<u32>,
     pub(crate) output_laws: LawSet,
     /// Whether output columns speak of rates dQ/dt.
     pub(crate) output_rates: bool,
@@ -297,7 +302,7 @@ impl System {
 
     /// A device's name.
     pub fn device_name(&self, id: DeviceId) -> &str {
-        self.devices.get(id.0 as usize).map_or("?", |device| device.name.as_str())
+        self.devices.get(id.0 as usize).map_or("?", |device| &*device.name)
     }
 
     /// What a device is called in a message: the element that it stands for, else its own name.
@@ -308,7 +313,7 @@ impl System {
 
     /// What an unknown is called in a message.
     pub fn spoken_unknown(&self, unknown: usize) -> &str {
-        let name = self.unknowns.get(unknown).map_or("?", |unknown| unknown.name.as_str());
+        let name = self.unknowns.get(unknown).map_or("?", |unknown| &*unknown.name);
         self.spoken.get(&name.to_lowercase()).map_or(name, String::as_str)
     }
 
@@ -326,7 +331,7 @@ impl System {
     fn input_name(&self, input: usize) -> String {
         let time = self.time_input;
         if input < time {
-            self.unknowns[input].name.clone()
+            self.unknowns[input].name.to_string()
         } else if input == time {
             "time".into()
         } else if input <= time + self.mode_slots {

@@ -83,7 +83,7 @@ pub fn decode(name: &str, bytes: Vec<u8>, map: &mut SourceMap) -> Result<FileId,
         Some(text) => text.into_bytes(),
         None => bytes,
     };
-    if let Some(offset) = bytes.iter().position(|byte| *byte == 0) {
+    if let Some(offset) = memchr::memchr(0, &bytes) {
         let span = show(name, &bytes, offset, map);
         return fail(LoadErrorKind::Binary { offset, span });
     }

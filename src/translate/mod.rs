@@ -320,7 +320,7 @@ impl Builder<'_> {
             None => what.to_string(),
         };
         self.cards.push(Card {
-            kind: CardKind::Device(Device { name, nodes, element }),
+            kind: CardKind::Device(Device { name, nodes: nodes.into(), element }),
             span,
             comment: Some(comment),
         });

@@ -190,7 +190,11 @@ impl Builder<'_> {
                 };
                 let initial = [start, start, start, -start].map(number);
                 let delay = self.constant(by);
-                let line = Element::Line { impedance: number(1.0), delay, initial: Some(initial) };
+                let line = Element::Line {
+                    impedance: number(1.0),
+                    delay,
+                    initial: Some(Box::new(initial)),
+                };
                 let device = self.namer.device('T', name);
                 self.device_on(device, vec![near, ground, node, ground], line, span, what);
                 let device = self.namer.device('R', name);

@@ -8,6 +8,14 @@ use crate::netlist::{self, Leaf as NetLeaf, Name, Source as NetSource, Waveform 
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
+/// The value of a source that is the same at all times.
+fn steady(source: &NetSource) -> &netlist::Expr {
+    match &source.waveform {
+        NetWaveform::Constant(value) => value,
+        other => panic!("{other:?}"),
+    }
+}
+
 /// The value of s at which storages are compared: impedances s·L and 1/(s·C), nothing stored at the start.
 const S: f64 = 0.7;
 
@@ -187,12 +195,8 @@ impl Solved {
                 Element::Resistor { value: r } => current = across(1.0 / value(r), a, b),
                 Element::Capacitor { value: c, .. } => current = across(S * value(c), a, b),
                 Element::Inductor { value: l, .. } => rows[row].0.push((row, -S * value(l))),
-                Element::VoltageSource(NetSource {
-                    waveform: NetWaveform::Constant(v), ..
-                }) => rows[row].1 = value(v),
-                Element::CurrentSource(NetSource {
-                    waveform: NetWaveform::Constant(i), ..
-                }) => forced = value(i),
+                Element::VoltageSource(source) => rows[row].1 = value(steady(source)),
+                Element::CurrentSource(source) => forced = value(steady(source)),
                 Element::Vcvs { gain, control } => {
                     let terms = across(-value(gain), node(control[0]), node(control[1]));
                     rows[row].0.extend(terms);
@@ -256,9 +260,7 @@ pub fn compare(graph: &BondGraph) -> Option<usize> {
                 S * value.constant().unwrap()
                     * (voltage(device.nodes[0]) - voltage(device.nodes[1]))
             }
-            Element::CurrentSource(NetSource {
-                waveform: NetWaveform::Constant(value), ..
-            }) => value.constant().unwrap(),
+            Element::CurrentSource(source) => steady(source).constant().unwrap(),
             other => panic!("current of {other:?}"),
         }
     };

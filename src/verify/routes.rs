@@ -60,7 +60,7 @@ pub fn circuit_route(netlist: &Netlist, reltol: f64, d: &mut Vec<Diagnostic>) ->
     let mut settings = sim::Settings::of(&circuit, true, d)?;
     settings.reltol = reltol;
     let names = std::iter::once("time".to_string());
-    let names = names.chain(stamps.outputs.iter().map(|output| output.0.clone())).collect();
+    let names = names.chain(stamps.outputs.iter().map(|output| output.0.to_string())).collect();
     let mut trace = Trace::new(names, vec![]);
     match sim::transient(&system, &settings, &mut trace) {
         Ok(statistics) => {

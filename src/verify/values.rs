@@ -246,10 +246,10 @@ impl Check<'_> {
         // Supply and load stand on either side of the switch.
         let ground = NodeId(0);
         let (a, b) = (circuit[switch].nodes.first()?, circuit[switch].nodes.get(1)?);
-        let hot = circuit[supply].nodes == [*a, ground] || circuit[supply].nodes == [*b, ground];
+        let stands = |device: usize, nodes: [NodeId; 2]| circuit[device].nodes[..] == nodes;
+        let hot = stands(supply, [*a, ground]) || stands(supply, [*b, ground]);
         let switched = if circuit[supply].nodes.first() == Some(a) { *b } else { *a };
-        let loaded =
-            circuit[load].nodes == [switched, ground] || circuit[load].nodes == [ground, switched];
+        let loaded = stands(load, [switched, ground]) || stands(load, [ground, switched]);
         if !hot || !loaded {
             return Some((Some(switch), "supply and load are not on either side of it".into()));
         }
@@ -294,15 +294,18 @@ impl Check<'_> {
             return Some((Some(hold), "its clock or its capacitor is missing".into()));
         };
         let ground = NodeId(0);
-        if circuit[capacitor].nodes != [circuit[hold].nodes[0], ground] {
+        if circuit[capacitor].nodes[..] != [circuit[hold].nodes[0], ground] {
             return Some((Some(capacitor), "it does not stand at the node that holds".into()));
         }
         let (pending, element) = self.text.element(clock)?;
-        let Element::VoltageSource(netlist::Source {
-            waveform: netlist::Waveform::Function { shape: Shape::Pulse, arguments },
-            ..
-        }) = element
-        else {
+        let pulse = match element {
+            Element::VoltageSource(source) => match &source.waveform {
+                netlist::Waveform::Function { shape: Shape::Pulse, arguments } => Some(arguments),
+                _ => None,
+            },
+            _ => None,
+        };
+        let Some(arguments) = pulse else {
             return Some((Some(clock), "it is no clock".into()));
         };
         let value = |k: usize| arguments.get(k).map_or(0.0, |a| self.written(pending.scope, a));

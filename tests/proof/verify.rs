@@ -7,7 +7,7 @@ use bondspice::bond::initial;
 use bondspice::cli::pipeline;
 use bondspice::diagnostic::{Diagnostic, Severity};
 use bondspice::expr::{Expr, Node};
-use bondspice::netlist::{CardKind, Element, Netlist};
+use bondspice::netlist::{CardKind, Element, Name, Netlist, Nodes};
 use bondspice::source::SourceMap;
 use bondspice::translate::translate;
 use bondspice::verify::{Report, Settings, verify_netlist};
@@ -68,7 +68,7 @@ fn every_shipped_model_passes() {
 #[track_caller]
 fn corrupt(
     netlist: &mut Netlist,
-    change: &mut dyn FnMut(&str, &mut Element, &mut Vec<bondspice::netlist::Name>) -> bool,
+    change: &mut dyn FnMut(&str, &mut Element, &mut Nodes<Name>) -> bool,
 ) {
     for at in 0..netlist.cards.len() {
         if let CardKind::Device(device) = &netlist.cards[at].kind {

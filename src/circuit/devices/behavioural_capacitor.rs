@@ -30,6 +30,7 @@ pub const ROW: Row = Row {
     stamp,
     current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralCapacitor { law, law_of, initial } = &stamper.device(id).kind else {
@@ -47,7 +48,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             stamper.add(id, through, leaving.clone());
             if let Some(charge) = stamper.charge_mut(id) {
                 charge.linear = leaving;
-                charge.into = vec![(rate, -1.0)];
+                charge.into = smallvec![(rate, -1.0)];
                 charge.initial = given;
             }
         }
@@ -68,7 +69,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
     let DeviceKind::BehaviouralCapacitor { law, .. } = &stamper.device(id).kind else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     match (stamper.hidden(id, 0), stamper.charge(id)) {
         (Some(rate), _) => {
@@ -76,7 +77,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
             Current::Law(stamper.law(law).binary(Binary::Multiply, rate))
         }
         (None, Some(charge)) => Current::Law(Law::leaf(Leaf::Rate(charge))),
-        (None, None) => Current::Linear(vec![]),
+        (None, None) => Current::nothing(),
     }
 }
 
@@ -98,7 +99,7 @@ mod tests {
         let kind = BehaviouralCapacitor { law: square(), law_of: LawOf::Stored, initial: None };
         let stamps = stamps(vec![("c1", vec![1, 0], kind)]);
         let charge = &stamps.charges[0];
-        assert_eq!(charge.into, [(UnknownId(0), 1.0)]);
+        assert_eq!(charge.into[..], [(UnknownId(0), 1.0)]);
         assert_eq!(value(charge.law.as_ref().unwrap(), &[3.0], &[], &[], 0.0), 9.0);
     }
 
@@ -111,7 +112,7 @@ mod tests {
         assert_eq!(conductances(&stamps), [[0.0, 0.0], [0.0, 1.0]]);
         assert_eq!(capacitances(&stamps), [[0.0, 0.0], [-1.0, 0.0]]);
         assert_eq!(stamps.charges[0].initial, Some(2.0));
-        assert_eq!(stamps.laws[0].into, [(UnknownId(0), 1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(0), 1.0)]);
         assert_eq!(value(&stamps.laws[0].law, &[3.0, 5.0], &[], &[], 0.0), 45.0);
         assert_eq!(stamps.outputs.len(), 1);
     }

@@ -16,6 +16,7 @@ pub const ROW: Row = Row {
     stamp,
     current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let law = current(stamper, id);
@@ -23,7 +24,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         Some(branch) => {
             stamper.through(id, branch);
             stamper.conductance(Some(branch), Some(branch), 1.0);
-            stamper.add(id, law, vec![(branch, -1.0)]);
+            stamper.add(id, law, smallvec![(branch, -1.0)]);
         }
         None => {
             let into = stamper.leaving(stamper.ends(id));
@@ -35,7 +36,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
     match &stamper.device(id).kind {
         DeviceKind::BehaviouralCurrent { law } => Current::Law(stamper.law(law)),
-        _ => Current::Linear(vec![]),
+        _ => Current::nothing(),
     }
 }
 
@@ -55,7 +56,7 @@ mod tests {
     #[test]
     fn its_law_leaves_the_first_node() {
         let stamps = stamps(vec![("b1", vec![1, 2], BehaviouralCurrent { law: square() })]);
-        assert_eq!(stamps.laws[0].into, [(UnknownId(0), 1.0), (UnknownId(1), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(0), 1.0), (UnknownId(1), -1.0)]);
         assert_eq!(value(&stamps.laws[0].law, &[0.0, 3.0], &[], &[], 0.0), 9.0);
         assert!(stamps.conductances.is_empty());
     }
@@ -66,7 +67,7 @@ mod tests {
             ("b1", vec![1, 0], BehaviouralCurrent { law: square() }),
             ("h1", vec![2, 0], Ccvs { gain: 3.0, control: DeviceId(0) }),
         ]);
-        assert_eq!(stamps.laws[0].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(2), -1.0)]);
         let g = conductances(&stamps);
         assert_eq!((g[0][2], g[2][2], g[3][2]), (1.0, 1.0, -3.0));
     }

@@ -30,6 +30,7 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralInductor { law, law_of, initial } = &stamper.device(id).kind else {
@@ -47,10 +48,10 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         (LawOf::Factor, Some(rate)) => {
             stamper.conductance(Some(rate), Some(rate), 1.0);
             let drop = law.binary(Binary::Multiply, Law::leaf(Leaf::Unknown(rate)));
-            stamper.add(id, Current::Law(drop), vec![(branch, -1.0)]);
+            stamper.add(id, Current::Law(drop), smallvec![(branch, -1.0)]);
             if let Some(flux) = stamper.charge_mut(id) {
-                flux.linear = vec![(branch, 1.0)];
-                flux.into = vec![(rate, -1.0)];
+                flux.linear = smallvec![(branch, 1.0)];
+                flux.into = smallvec![(rate, -1.0)];
                 flux.initial = *initial;
             }
         }
@@ -62,7 +63,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             if let Some(flux) = stamper.charge_mut(id) {
                 flux.initial = start;
                 flux.law = Some(law);
-                flux.into = vec![(branch, -1.0)];
+                flux.into = smallvec![(branch, -1.0)];
             }
         }
     }
@@ -86,7 +87,7 @@ mod tests {
         let kind = BehaviouralInductor { law: square(), law_of: LawOf::Stored, initial: None };
         let stamps = stamps(vec![("l1", vec![1, 0], kind)]);
         let flux = &stamps.charges[0];
-        assert_eq!(flux.into, [(UnknownId(1), -1.0)]);
+        assert_eq!(flux.into[..], [(UnknownId(1), -1.0)]);
         assert_eq!(value(flux.law.as_ref().unwrap(), &[0.0, 3.0], &[], &[], 0.0), 9.0);
     }
 
@@ -96,7 +97,7 @@ mod tests {
         let stamps = stamps(vec![("l1", vec![1, 0], kind)]);
         assert_eq!(conductances(&stamps), [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
         assert_eq!(capacitances(&stamps)[2], [0.0, -1.0, 0.0]);
-        assert_eq!(stamps.laws[0].into, [(UnknownId(1), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(1), -1.0)]);
         assert_eq!(value(&stamps.laws[0].law, &[0.0, 3.0, 5.0], &[], &[], 0.0), 45.0);
         assert_eq!(stamps.charges[0].initial, Some(2.0));
     }

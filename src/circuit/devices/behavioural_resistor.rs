@@ -17,6 +17,7 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralResistor { law } = &stamper.device(id).kind else { return };
@@ -25,7 +26,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     stamper.through(id, branch);
     stamper.difference(Some(branch), ends, 1.0);
     let drop = stamper.law(law).binary(Binary::Multiply, Law::leaf(Leaf::Unknown(branch)));
-    stamper.add(id, Current::Law(drop), vec![(branch, -1.0)]);
+    stamper.add(id, Current::Law(drop), smallvec![(branch, -1.0)]);
 }
 
 #[cfg(test)]
@@ -41,7 +42,7 @@ mod tests {
         let law = Expr::leaf(Leaf::Voltage(NodeId(2), NodeId(0))).binary(Add, Expr::number(1.0));
         let stamps = stamps(vec![("r1", vec![1, 2], BehaviouralResistor { law })]);
         assert_eq!(conductances(&stamps), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, -1.0, 0.0]]);
-        assert_eq!(stamps.laws[0].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(2), -1.0)]);
         // R = v2 + 1 = 4, i = 5
         assert_eq!(value(&stamps.laws[0].law, &[7.0, 3.0, 5.0], &[], &[], 0.0), 20.0);
     }

@@ -13,6 +13,7 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralVoltage { law } = &stamper.device(id).kind else { return };
@@ -21,7 +22,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     stamper.through(id, branch);
     stamper.difference(Some(branch), ends, 1.0);
     // As a term with the factor −1 and not as −law: equal laws of several cards then stay equal.
-    stamper.add(id, Current::Law(stamper.law(law)), vec![(branch, -1.0)]);
+    stamper.add(id, Current::Law(stamper.law(law)), smallvec![(branch, -1.0)]);
 }
 
 #[cfg(test)]
@@ -42,7 +43,7 @@ mod tests {
             ("r1", vec![0, 2], Resistor { resistance: 2.0 }),
         ]);
         assert_eq!(conductances(&stamps)[2], [1.0, 0.0, 0.0]);
-        assert_eq!(stamps.laws[0].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(2), -1.0)]);
         // v(2, 1) = 4, i(r1) = −6/2, t = 10
         assert_eq!(value(&stamps.laws[0].law, &[2.0, 6.0, 0.0], &[], &[], 10.0), 4.0 * -3.0 * 10.0);
     }

@@ -42,7 +42,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
     match stamper.charge(id) {
         Some(charge) => Current::Law(Law::leaf(Leaf::Rate(charge))),
-        None => Current::Linear(vec![]),
+        None => Current::nothing(),
     }
 }
 
@@ -62,8 +62,8 @@ mod tests {
         ]);
         assert_eq!(capacitances(&stamps), [[2.0, -2.0], [-2.0, 2.0 + 5.0]]);
         assert_eq!(stamps.charges.iter().map(|q| q.initial).collect::<Vec<_>>(), [Some(6.0), None]);
-        assert_eq!(stamps.charges[1].linear, [(UnknownId(1), -5.0)]);
-        assert_eq!(stamps.charges[1].into, [(UnknownId(1), -1.0)]);
+        assert_eq!(stamps.charges[1].linear[..], [(UnknownId(1), -5.0)]);
+        assert_eq!(stamps.charges[1].into[..], [(UnknownId(1), -1.0)]);
     }
 
     #[test]
@@ -89,6 +89,6 @@ mod tests {
             ("b1", vec![2, 0], BehaviouralVoltage { law }),
         ]);
         assert_eq!(stamps.laws[0].law, Law::leaf(Leaf::Rate(0)));
-        assert_eq!(stamps.laws[0].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.laws[0].into[..], [(UnknownId(2), -1.0)]);
     }
 }

@@ -35,7 +35,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
     let DeviceKind::Cccs { gain, control } = stamper.device(id).kind else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     stamper.current(control).scaled(gain)
 }

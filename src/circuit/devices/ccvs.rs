@@ -50,7 +50,7 @@ mod tests {
         assert_eq!(g[4], [0.0, 1.0, 0.0, -3.0, 0.0, 0.0]);
         assert_eq!(g[5], [0.0, -1.0, 1.0, 0.0, 0.0, 0.0]);
         let law = &stamps.laws[0];
-        assert_eq!(law.into, [(crate::circuit::stamps::UnknownId(5), 1.0)]);
+        assert_eq!(law.into[..], [(crate::circuit::stamps::UnknownId(5), 1.0)]);
         assert_eq!(value(&law.law, &[], &[], &[2.0], 0.0), -14.0);
     }
 }

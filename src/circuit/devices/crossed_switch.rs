@@ -65,7 +65,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
         Some(mode),
     ) = (&stamper.device(id).kind, stamper.mode(id))
     else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     let at_least =
         |limit: f64| stamper.law(control).binary(Binary::GreaterEqual, Law::number(limit));

@@ -15,6 +15,7 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::CurrentSource { waveform, parts } = &stamper.device(id).kind else { return };
@@ -22,7 +23,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         Some(branch) => {
             stamper.through(id, branch);
             stamper.conductance(Some(branch), Some(branch), 1.0);
-            stamper.add_source(id, waveform, *parts, vec![(branch, 1.0)]);
+            stamper.add_source(id, waveform, *parts, smallvec![(branch, 1.0)]);
         }
         None => {
             let leaving = stamper.leaving(stamper.ends(id));

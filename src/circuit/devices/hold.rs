@@ -19,6 +19,7 @@ pub const ROW: Row = Row {
     stamp,
     current: super::no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Hold { period, round } = stamper.device(id).kind else { return };
@@ -32,7 +33,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         device: id,
         kind: MemoryKind::Hold { period, round },
         input: voltage([sampled, None]),
-        into: vec![(branch, 1.0)],
+        into: smallvec![(branch, 1.0)],
         initial: None,
     });
 }
@@ -48,7 +49,7 @@ mod tests {
         let stamps = stamps(vec![("s1", vec![1, 2], Hold { period: 0.5, round: 0 })]);
         assert_eq!(conductances(&stamps), [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
         let memory = &stamps.memories[0];
-        assert_eq!(memory.into, [(UnknownId(2), 1.0)]);
+        assert_eq!(memory.into[..], [(UnknownId(2), 1.0)]);
         assert_eq!(value(&memory.input, &[5.0, 7.0, 0.0], &[], &[], 0.0), 7.0);
     }
 }

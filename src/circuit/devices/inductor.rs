@@ -46,7 +46,7 @@ mod tests {
     fn stamps_a_branch_with_a_flux() {
         let stamps =
             stamps(vec![("L1", vec![1, 2], Inductor { inductance: 3.0, initial: Some(0.5) })]);
-        assert_eq!(stamps.unknowns[2].name, "i(l1)");
+        assert_eq!(&*stamps.unknowns[2].name, "i(l1)");
         assert_eq!(conductances(&stamps), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, -1.0, 0.0]]);
         assert_eq!(capacitances(&stamps), [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -3.0]]);
         assert_eq!(stamps.charges[0].initial, Some(1.5));

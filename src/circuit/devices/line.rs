@@ -24,6 +24,7 @@ pub const ROW: Row = Row {
     stamp,
     current: super::no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let device = stamper.device(id);
@@ -57,7 +58,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             device: id,
             kind: MemoryKind::Delay { by: delay },
             input: wave(ports[from]),
-            into: vec![(ports[row].0, 1.0)],
+            into: smallvec![(ports[row].0, 1.0)],
             initial,
         });
     }

@@ -145,7 +145,7 @@ pub fn row(kind: &DeviceKind) -> &'static Row {
 
 /// The current of a device that always has a branch, or none: never asked for, but 0 is true of nothing else.
 fn no_current(_: &Stamper, _: DeviceId) -> Current {
-    Current::Linear(vec![])
+    Current::nothing()
 }
 
 /// What a behavioural storage holds when its own voltage, or its own current, is `value`; an error where its law speaks of
@@ -189,7 +189,7 @@ pub(crate) mod testing {
         let node =
             |k: u32| Node { name: k.to_string(), nominal: None, span: crate::source::Span::NONE };
         let device = |(name, nodes, kind): (&str, Vec<u32>, DeviceKind)| Device {
-            name: name.to_string(),
+            name: name.into(),
             nodes: nodes.into_iter().map(NodeId).collect(),
             kind,
             nominal: None,

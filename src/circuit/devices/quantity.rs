@@ -31,6 +31,7 @@ pub const ROW: Row = Row {
         Current::Linear(stamper.hidden(id, 0).map(|u| (u, 1.0)).into_iter().collect())
     },
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Quantity(quantity) = &stamper.device(id).kind else { return };
@@ -41,7 +42,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             let law = stamper.law(law);
             if let Some(charge) = stamper.charge_mut(id) {
                 charge.law = Some(law);
-                charge.into = vec![(own, -1.0)];
+                charge.into = smallvec![(own, -1.0)];
             }
         }
         Quantity::Integral { law, initial, pinned } => {
@@ -49,10 +50,10 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
                 return;
             }
             let law = stamper.law(law);
-            stamper.add_law(id, law, vec![(own, -1.0)]);
+            stamper.add_law(id, law, smallvec![(own, -1.0)]);
             if let Some(charge) = stamper.charge_mut(id) {
-                charge.linear = vec![(own, 1.0)];
-                charge.into = vec![(own, 1.0)];
+                charge.linear = smallvec![(own, 1.0)];
+                charge.into = smallvec![(own, 1.0)];
                 charge.initial = Some(*initial);
                 charge.pinned = *pinned;
             }
@@ -68,19 +69,19 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
             let Some(input) = stamper.hidden(id, 1) else { return };
             stamper.conductance(Some(input), Some(input), 1.0);
             let law = stamper.law(law);
-            stamper.add_law(id, law, vec![(input, -1.0)]);
+            stamper.add_law(id, law, smallvec![(input, -1.0)]);
             stamper.conductance(Some(own), Some(own), 1.0);
             stamper.stamps.memories.push(MemoryStamp {
                 device: id,
                 kind: MemoryKind::Delay { by: *by },
                 input: Law::leaf(Leaf::Unknown(input)),
-                into: vec![(own, 1.0)],
+                into: smallvec![(own, 1.0)],
                 initial: None,
             });
         }
         Quantity::Signal { waveform } => {
             stamper.conductance(Some(own), Some(own), 1.0);
-            stamper.add_source(id, waveform, Parts::default(), vec![(own, 1.0)]);
+            stamper.add_source(id, waveform, Parts::default(), smallvec![(own, 1.0)]);
         }
     }
 }
@@ -112,13 +113,13 @@ mod tests {
         // v1, i(b1), u
         let stamps = read(Quantity::Derivative { law: square() });
         assert_eq!(conductances(&stamps)[2], [0.0, 0.0, 1.0]);
-        assert_eq!(stamps.charges[0].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.charges[0].into[..], [(UnknownId(2), -1.0)]);
         assert_eq!(value(stamps.charges[0].law.as_ref().unwrap(), &[3.0], &[], &[], 0.0), 9.0);
         assert_eq!(value(&stamps.laws[0].law, &[0.0, 0.0, 7.0], &[], &[], 0.0), 7.0);
         let stamps = read(Quantity::Integral { law: square(), initial: 4.0, pinned: true });
         assert_eq!(capacitances(&stamps)[2], [0.0, 0.0, 1.0]);
         assert_eq!((stamps.charges[0].initial, stamps.charges[0].pinned), (Some(4.0), true));
-        assert_eq!(stamps.laws[1].into, [(UnknownId(2), -1.0)]);
+        assert_eq!(stamps.laws[1].into[..], [(UnknownId(2), -1.0)]);
         assert_eq!(value(&stamps.laws[1].law, &[3.0], &[], &[], 0.0), 9.0);
         assert_eq!(stamps.outputs.len(), 2);
     }

@@ -94,7 +94,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
         ..
     } = &stamper.device(id).kind
     else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     let middle = 0.5 * (on_resistance * off_resistance).ln();
     let ratio = (on_resistance / off_resistance).ln();

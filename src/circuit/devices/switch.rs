@@ -65,7 +65,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
     let DeviceKind::Switch { control, on, on_resistance, off_resistance, .. } =
         &stamper.device(id).kind
     else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     let closed = match stamper.mode(id) {
         Some(mode) => Law::leaf(Leaf::Mode(mode)),
@@ -99,7 +99,7 @@ mod tests {
     fn conducts_by_its_mode() {
         let stamps = stamps(vec![("s1", vec![1, 2], switch(2.0, 1.0))]);
         let law = &stamps.laws[0];
-        assert_eq!(law.into, [(UnknownId(0), 1.0), (UnknownId(1), -1.0)]);
+        assert_eq!(law.into[..], [(UnknownId(0), 1.0), (UnknownId(1), -1.0)]);
         assert_eq!(value(&law.law, &[5.0, 1.0, 0.0], &[1.0], &[], 0.0), 8.0);
         assert_eq!(value(&law.law, &[5.0, 1.0, 0.0], &[0.0], &[], 0.0), 1.0);
         let mode = &stamps.modes[0];

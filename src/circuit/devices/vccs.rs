@@ -24,7 +24,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
     let DeviceKind::Vccs { gain, control } = stamper.device(id).kind else {
-        return Current::Linear(vec![]);
+        return Current::nothing();
     };
     Current::Linear(stamper.leaving(control.map(|node| stamper.node(node)))).scaled(gain)
 }

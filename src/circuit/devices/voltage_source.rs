@@ -13,6 +13,7 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
+use smallvec::smallvec;
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::VoltageSource { waveform, parts } = &stamper.device(id).kind else { return };
@@ -20,7 +21,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let ends = stamper.ends(id);
     stamper.through(id, branch);
     stamper.difference(Some(branch), ends, 1.0);
-    stamper.add_source(id, waveform, *parts, vec![(branch, 1.0)]);
+    stamper.add_source(id, waveform, *parts, smallvec![(branch, 1.0)]);
 }
 
 #[cfg(test)]

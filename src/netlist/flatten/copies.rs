@@ -21,7 +21,7 @@ impl Expander<'_> {
         d: &mut Vec<Diagnostic>,
     ) {
         let scope = self.flat.scopes.get(id);
-        let inside = |name: &Name| scope.nodes.get(name).is_some_and(|node| node.0 != 0);
+        let inside = |name: &Name| scope.node(*name).is_some_and(|node| node.0 != 0);
         let global = |name: &&Name| {
             self.flat.scopes.globals.contains_key(name)
                 && Some(**name) != self.ground
@@ -84,18 +84,18 @@ impl Flat<'_> {
             let sense = DeviceId((self.devices.len() + made.len()) as u32);
             let [outer, inner] = joint.nodes;
             let constant = circuit::Waveform::Constant(0.0);
-            let device = |name: String, nodes, kind| circuit::Device {
-                name,
-                nodes,
+            let device = |name: String, nodes: [NodeId; 2], kind| circuit::Device {
+                name: name.into(),
+                nodes: nodes.as_slice().into(),
                 kind,
                 nominal: None,
                 span: joint.card.span,
             };
             let parts = circuit::Parts::default();
             let kind = circuit::DeviceKind::VoltageSource { waveform: constant, parts };
-            made.push(device(joint.name.clone(), vec![outer, inner], kind));
+            made.push(device(joint.name.clone(), [outer, inner], kind));
             let kind = circuit::DeviceKind::Cccs { gain: joint.copies - 1.0, control: sense };
-            made.push(device(format!("{}#others", joint.name), vec![outer, NodeId(0)], kind));
+            made.push(device(format!("{}#others", joint.name), [outer, NodeId(0)], kind));
         }
     }
 }

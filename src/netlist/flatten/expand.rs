@@ -1,11 +1,11 @@
 //! The first pass: scopes, nodes and numbered devices.
 
 use super::copies::{COPIES, Joint};
-use super::scope::{self, Scope, ScopeId, Scopes, TOP, Table};
+use super::scope::{self, Numbers, Scope, ScopeId, Scopes, TOP, Table};
 use super::sources::Times;
 use super::values::near;
 use super::vary::Variation;
-use crate::circuit::{self, DeviceId, Node, NodeId};
+use crate::circuit::{self, Node, NodeId, Nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::read::number;
 use crate::netlist::{
@@ -34,7 +34,7 @@ pub struct Flat<'n> {
     pub nodes: Vec<Node>,
     /// Devices in order.
     pub devices: Vec<Pending<'n>>,
-    /// The cards outside of subcircuits, one branch of each `.if` in its place.
+    /// The cards outside of subcircuits that are no devices, one branch of each `.if` in its place.
     pub live: Vec<&'n Card>,
     /// `.nodeset` values with their scopes.
     pub guesses: Vec<(ScopeId, Name, &'n Expr, Span)>,
@@ -63,7 +63,7 @@ pub struct Pending<'n> {
     /// Where it stands.
     pub scope: ScopeId,
     /// Its nodes.
-    pub nodes: Vec<NodeId>,
+    pub nodes: Nodes<NodeId>,
     /// Which pair of inductors, for a K of several.
     pub pair: (usize, usize),
 }
@@ -96,14 +96,19 @@ pub fn expand_with<'n>(
         joints: vec![],
         quantities: RefCell::default(),
     };
-    flat.scopes.all.push(Scope::default());
-    let stated = |key: &str| stated(netlist, variation, key);
+    let numbers = || Numbers::dense(netlist.names.len());
+    flat.scopes.all.push(Scope { nodes: numbers(), devices: numbers(), ..Scope::default() });
+    // Devices are by far the most, and say nothing here.
+    let is_device = |card: &&Card| matches!(card.kind, CardKind::Device(_));
+    let special: Vec<&Card> = netlist.cards.iter().filter(|card| !is_device(card)).collect();
+    let options: Vec<&(String, String)> = options(&special).chain(&variation.options).collect();
+    let stated = |key: &str| stated(netlist, &options, key);
     flat.scopes.temperature = variation.temperature.or_else(|| stated("temp")).unwrap_or(ROOM);
     let seed = stated("seed").filter(|seed| *seed >= 0.0).unwrap_or(1.0);
     flat.scopes.seed = random::below(seed as u64, &format!("step {}", variation.step));
     let ground = netlist.names.find("0");
     let mut expander = Expander { flat, variation, ground, chain: vec![], several: 0, full: false };
-    globals(&mut expander.flat.scopes.globals, &netlist.cards);
+    globals(&mut expander.flat.scopes.globals, special.iter().copied());
     let varied: Vec<(Name, &Expr)> =
         variation.parameters.iter().map(|(name, expr)| (*name, expr)).collect();
     let (live, mut given) = expander.choose(TOP, &netlist.cards, &[], &varied, d);
@@ -120,6 +125,7 @@ pub fn expand_with<'n>(
     expander.body(TOP, &live, d);
     let mut flat = expander.flat;
     flat.live = live;
+    flat.live.retain(|card| !matches!(card.kind, CardKind::Device(_)));
     if flat.devices.is_empty() && !crate::diagnostic::has_errors(d) {
         d.push(
             Diagnostic::error("E0734", Span::NONE, "the netlist holds no device")
@@ -129,14 +135,19 @@ pub fn expand_with<'n>(
     flat
 }
 
-/// The number that an option states. One that cannot be read is told of elsewhere.
-fn stated(netlist: &Netlist, variation: &Variation, key: &str) -> Option<f64> {
-    let numbers = netlist.dialect.reading().numbers;
-    let cards = netlist.cards.iter().filter_map(|card| match &card.kind {
+/// The options of all cards outside of subcircuits, in order.
+fn options<'n>(cards: &[&'n Card]) -> impl Iterator<Item = &'n (String, String)> {
+    let cards = cards.iter().filter_map(|card| match &card.kind {
         CardKind::Options(options) => Some(options),
         _ => None,
     });
-    let texts = cards.flatten().chain(&variation.options).filter(|(own, _)| own == key);
+    cards.flatten()
+}
+
+/// The number that an option states, in any case. One that cannot be read is told of elsewhere.
+fn stated(netlist: &Netlist, options: &[&(String, String)], key: &str) -> Option<f64> {
+    let numbers = netlist.dialect.reading().numbers;
+    let texts = options.iter().filter(|(own, _)| own.eq_ignore_ascii_case(key));
     let values = texts.filter_map(|(_, text)| number::number(text, numbers));
     values.map(|read| read.value).reduce(|_, last| last)
 }
@@ -156,13 +167,13 @@ pub(super) struct Expander<'n> {
 type Given<'n> = Vec<(Name, &'n Expr)>;
 
 /// Nodes of `.global`, wherever it stands.
-fn globals(found: &mut Table<()>, cards: &[Card]) {
+fn globals<'n>(found: &mut Table<()>, cards: impl Iterator<Item = &'n Card>) {
     for card in cards {
         match &card.kind {
             CardKind::Global(nodes) => found.extend(nodes.iter().map(|node| (*node, ()))),
-            CardKind::Subcircuit(subcircuit) => globals(found, &subcircuit.cards),
+            CardKind::Subcircuit(subcircuit) => globals(found, subcircuit.cards.iter()),
             CardKind::Choice(branches) => {
-                branches.iter().for_each(|branch| globals(found, &branch.cards));
+                branches.iter().for_each(|branch| globals(found, branch.cards.iter()));
             }
             _ => {}
         }
@@ -315,14 +326,16 @@ impl<'n> Expander<'n> {
         }
         let (scopes, nodes) = (&mut self.flat.scopes, &mut self.flat.nodes);
         let id = match scopes.globals.contains_key(&name) {
-            true if !scopes.get(id).nodes.contains_key(&name) => TOP,
+            true if scopes.get(id).node(name).is_none() => TOP,
             _ => id,
         };
-        let Scope { nodes: known, path, .. } = scopes.get_mut(id);
-        *known.entry(name).or_insert_with(|| {
+        let scope = scopes.get_mut(id);
+        scope.node(name).unwrap_or_else(|| {
             let text = self.flat.netlist.names.text(name);
-            nodes.push(Node { name: [path, text].concat(), nominal: None, span });
-            NodeId(nodes.len() as u32 - 1)
+            let number = nodes.len() as u32;
+            nodes.push(Node { name: [&scope.path, text].concat(), nominal: None, span });
+            scope.nodes.insert(name, number);
+            NodeId(number)
         })
     }
 
@@ -338,19 +351,16 @@ impl<'n> Expander<'n> {
                 self.variation.devices.get(&path).unwrap_or(device)
             }
         };
-        let nodes: Vec<NodeId> =
+        let nodes: Nodes<NodeId> =
             device.nodes.iter().map(|name| self.node(id, *name, card.span)).collect();
         let names = &self.flat.netlist.names;
         if self.several > 0 {
             self.refuse_globals(id, card, device, d);
         }
-        let number = DeviceId(self.flat.devices.len() as u32);
+        let number = self.flat.devices.len() as u32;
         if let Some(before) = self.flat.scopes.get_mut(id).devices.insert(device.name, number) {
-            let first = self
-                .flat
-                .devices
-                .get(before.0 as usize)
-                .map_or(Span::NONE, |first| first.card.span);
+            let first =
+                self.flat.devices.get(before as usize).map_or(Span::NONE, |first| first.card.span);
             d.push(twice("devices", names.text(device.name), card.span, first));
         }
         match &device.element {
@@ -365,7 +375,7 @@ impl<'n> Expander<'n> {
                             card,
                             device,
                             scope: id,
-                            nodes: vec![],
+                            nodes: Nodes::new(),
                             pair,
                         });
                     }
@@ -441,7 +451,7 @@ impl<'n> Expander<'n> {
             return;
         }
         let several = self.copies(id, card, subcircuit, parameters, d);
-        let mut table: Table<NodeId> = Table::default();
+        let mut inner_nodes = Numbers::default();
         for (port, node) in subcircuit.ports.iter().zip(nodes) {
             let inner = match several {
                 Some(copies) if node.0 != 0 => {
@@ -455,7 +465,7 @@ impl<'n> Expander<'n> {
                 }
                 _ => *node,
             };
-            table.insert(*port, inner);
+            inner_nodes.insert(*port, inner.0);
         }
         let (mut values, mut varying): (Vec<(Name, Expr)>, Vec<Name>) = (vec![], vec![]);
         for (name, expr) in parameters {
@@ -490,7 +500,7 @@ impl<'n> Expander<'n> {
         self.flat.scopes.all.push(Scope {
             path,
             parent: Some(place),
-            nodes: table,
+            nodes: inner_nodes,
             ..Scope::default()
         });
         self.flat.scopes.get_mut(inner).varying.extend(varying.iter().map(|name| (*name, ())));

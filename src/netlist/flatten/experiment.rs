@@ -32,6 +32,8 @@ pub fn settings(
         options.push(("jumps".to_string(), "before".to_string()));
         options.push(("reltol".to_string(), PRESENT.to_string()));
     }
+    let is_sensitivity =
+        |wanted: &WantedAnalysis| matches!(wanted, WantedAnalysis::Sensitivity { .. });
     for card in &flat.live {
         match &card.kind {
             CardKind::Options(given) => options.extend(given.iter().cloned()),
@@ -58,16 +60,18 @@ pub fn settings(
                     analyses.push(Analysis::Transient { step, stop, start, hmax, uic: *uic });
                 }
             }
-            CardKind::Analysis(WantedAnalysis::Sensitivity { .. }) => {}
-            CardKind::Analysis(wanted) => {
+            CardKind::Analysis(wanted) if !is_sensitivity(wanted) => {
                 analyses.extend(super::analyses::analysis(flat, wanted, card.span, d));
             }
             _ => {}
         }
     }
+    // Sensitivities are those of the other analyses.
     let ways = super::sensitivity::ways(&mut options);
     for card in &flat.live {
-        if let CardKind::Analysis(wanted @ WantedAnalysis::Sensitivity { .. }) = &card.kind {
+        if let CardKind::Analysis(wanted) = &card.kind
+            && is_sensitivity(wanted)
+        {
             let made = super::sensitivity::analysis(flat, wanted, &analyses, ways, card.span, d);
             analyses.extend(made);
         }

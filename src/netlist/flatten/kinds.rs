@@ -23,7 +23,7 @@ pub fn resolve(flat: &Flat, header: &Header, times: Times, d: &mut Vec<Diagnosti
             let kind =
                 sampled(flat, pending, header).or_else(|| kind(&lookup, pending, header, times, d));
             Device {
-                name: flat.device_name(pending),
+                name: flat.device_name(pending).into(),
                 nodes: pending.nodes.clone(),
                 kind: kind.unwrap_or(DeviceKind::Resistor { resistance: f64::NAN }),
                 nominal: None,
@@ -90,6 +90,13 @@ fn kind(
             PassiveKind::Inductor => DeviceKind::Inductor { inductance: value, initial: start },
         })
     };
+    // A value that changes with time, or follows from others, is a law.
+    let moving = |source: &Source| match &source.waveform {
+        Waveform::Constant(law) if scope::varies(&lookup.flat.scopes, scope, law) => {
+            Some(law.clone())
+        }
+        _ => None,
+    };
     Some(match &pending.device.element {
         Element::Resistor { value } => plain(PassiveKind::Resistor, value, &None, d)?,
         Element::Capacitor { value, initial } => plain(PassiveKind::Capacitor, value, initial, d)?,
@@ -112,23 +119,18 @@ fn kind(
             let second = lookup.device(scope, second, span, d);
             DeviceKind::Mutual { inductors: [first?, second?], coupling: number(coupling, d)? }
         }
-        // A value that changes with time, or follows from others, is a law.
-        Element::VoltageSource(Source { waveform: Waveform::Constant(law), .. })
-            if scope::varies(&lookup.flat.scopes, scope, law) =>
-        {
-            DeviceKind::BehaviouralVoltage { law: lookup.law(scope, law, d)? }
-        }
-        Element::CurrentSource(Source { waveform: Waveform::Constant(law), .. })
-            if scope::varies(&lookup.flat.scopes, scope, law) =>
-        {
-            DeviceKind::BehaviouralCurrent { law: lookup.law(scope, law, d)? }
-        }
         Element::VoltageSource(source) => {
+            if let Some(law) = moving(source) {
+                return Some(DeviceKind::BehaviouralVoltage { law: lookup.law(scope, &law, d)? });
+            }
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
             DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
         }
         Element::CurrentSource(source) => {
+            if let Some(law) = moving(source) {
+                return Some(DeviceKind::BehaviouralCurrent { law: lookup.law(scope, &law, d)? });
+            }
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
             DeviceKind::CurrentSource { waveform: waveform?, parts: parts? }
@@ -153,7 +155,7 @@ fn kind(
             let values = match initial {
                 Some(values) => {
                     let mut numbers = [0.0; 4];
-                    for (number_of, value) in numbers.iter_mut().zip(values) {
+                    for (number_of, value) in numbers.iter_mut().zip(values.iter()) {
                         *number_of = number(value, d)?;
                     }
                     Some(numbers)

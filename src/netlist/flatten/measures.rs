@@ -26,12 +26,12 @@ pub struct Taken {
 
 /// What the cards of a netlist take from rows.
 pub fn resolve(flat: &Flat, d: &mut Vec<Diagnostic>) -> Taken {
-    let cards = flat.netlist.cards.iter().filter_map(|card| match &card.kind {
+    let cards = flat.live.iter().filter_map(|card| match &card.kind {
         CardKind::Measure(measure) => Some((measure, card.span)),
         _ => None,
     });
     let cards: Vec<_> = cards.collect();
-    let fourier = flat.netlist.cards.iter().filter_map(|card| match &card.kind {
+    let fourier = flat.live.iter().filter_map(|card| match &card.kind {
         CardKind::Fourier(fourier) => Some((fourier, card.span)),
         _ => None,
     });

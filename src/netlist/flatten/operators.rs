@@ -4,7 +4,7 @@ use super::scope::{self, ScopeId};
 use super::sources;
 use super::transfer;
 use super::values::Lookup;
-use crate::circuit::{self, Device, DeviceId, DeviceKind, NodeId, Quantity};
+use crate::circuit::{self, Device, DeviceId, DeviceKind, NodeId, Nodes, Quantity};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Curve, Node};
 use crate::netlist::{Expr, Operator};
@@ -109,8 +109,8 @@ impl Lookup<'_, '_> {
         let mut quantities = self.flat.quantities.borrow_mut();
         let number = quantities.len();
         quantities.push(Device {
-            name: format!("{what}#{}", number + 1),
-            nodes: vec![],
+            name: format!("{what}#{}", number + 1).into(),
+            nodes: Nodes::new(),
             kind: DeviceKind::Quantity(quantity),
             nominal: None,
             span,

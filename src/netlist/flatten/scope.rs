@@ -11,6 +11,59 @@ use rustc_hash::FxHashMap;
 /// A table by names. Never walked, so that no order of a hash shows.
 pub type Table<V> = FxHashMap<Name, V>;
 
+/// Nodes or devices by names: at the top, where a big netlist has most of its names, at their numbers, elsewhere hashed.
+pub enum Numbers {
+    /// The number of each name; [`Numbers::NONE`] where it has none.
+    Dense(Vec<u32>),
+    /// By name.
+    Sparse(Table<u32>),
+}
+
+impl Default for Numbers {
+    fn default() -> Numbers {
+        Numbers::Sparse(Table::default())
+    }
+}
+
+impl Numbers {
+    const NONE: u32 = u32::MAX;
+
+    /// Room for every name below a number.
+    pub fn dense(names: usize) -> Numbers {
+        Numbers::Dense(vec![Numbers::NONE; names])
+    }
+
+    /// The number of a name.
+    pub fn get(&self, name: Name) -> Option<u32> {
+        match self {
+            Numbers::Dense(all) => {
+                all.get(name.0 as usize).copied().filter(|number| *number != Numbers::NONE)
+            }
+            Numbers::Sparse(table) => table.get(&name).copied(),
+        }
+    }
+
+    /// Gives a name a number; says which it had before.
+    pub fn insert(&mut self, name: Name, number: u32) -> Option<u32> {
+        match self {
+            Numbers::Dense(all) => {
+                let known = self::slot(all, name.0 as usize);
+                let before = std::mem::replace(known, number);
+                (before != Numbers::NONE).then_some(before)
+            }
+            Numbers::Sparse(table) => table.insert(name, number),
+        }
+    }
+}
+
+/// The place of an index in a list that grows as far as it is asked for.
+fn slot(all: &mut Vec<u32>, index: usize) -> &mut u32 {
+    if index >= all.len() {
+        all.resize(index + 1, Numbers::NONE);
+    }
+    &mut all[index]
+}
+
 /// Index of a scope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScopeId(pub u32);
@@ -32,9 +85,9 @@ pub struct Scope<'n> {
     /// Both as they are written, and the scope whose words they use.
     pub written: Table<(ScopeId, &'n Expr)>,
     /// Nodes.
-    pub nodes: Table<NodeId>,
+    pub nodes: Numbers,
     /// Devices; of a K with several pairs the first.
-    pub devices: Table<DeviceId>,
+    pub devices: Numbers,
     /// Models.
     pub models: Table<Model<'n>>,
     /// Definitions.
@@ -59,6 +112,18 @@ pub const NOMINAL: f64 = 27.0;
 
 /// The top of the netlist.
 pub const TOP: ScopeId = ScopeId(0);
+
+impl Scope<'_> {
+    /// The node of a name.
+    pub fn node(&self, name: Name) -> Option<NodeId> {
+        self.nodes.get(name).map(NodeId)
+    }
+
+    /// The device of a name.
+    pub fn device(&self, name: Name) -> Option<DeviceId> {
+        self.devices.get(name).map(DeviceId)
+    }
+}
 
 impl<'n> Scopes<'n> {
     /// The scope of an index.

@@ -16,29 +16,27 @@ pub fn check(netlist: &Netlist, header: &Header, d: &mut Vec<Diagnostic>) {
         return;
     }
     let cards = every(&netlist.cards);
-    let globals = cards.iter().filter_map(|card| match &card.kind {
-        CardKind::Global(nodes) => Some(nodes.iter().copied()),
-        _ => None,
-    });
-    let globals = globals.flatten().collect();
-    let mut usage =
-        Usage { globals, found: 0, scope: 0, last: 0, counts: vec![(0, 0); netlist.names.len()] };
+    let counts = vec![(0, 0); netlist.names.len()];
+    let mut usage = Usage { globals: vec![], found: 0, scope: 0, last: 0, counts };
     // Domains of the header name nodes too; what they name is meant.
     let nodes = header.domains.iter().flat_map(|domain| &domain.nodes);
     let meant: Vec<Name> = nodes.filter_map(|name| netlist.names.find(name)).collect();
-    usage.scope(netlist, &netlist.cards, &meant, d);
+    usage.scope(netlist, &cards, &meant, d);
     if usage.found > MOST {
         let message = format!("{} more nodes are named only once", usage.found - MOST);
         d.push(Diagnostic::warning("W0731", Span::NONE, message));
     }
 }
 
+/// The first scope, that of the cards outside of subcircuits.
+const TOP: u32 = 1;
+
 /// As many are named; of a big deck nobody reads more.
 const MOST: usize = 20;
 
 /// The cards of a block, those of every branch of its choices too.
 fn every(cards: &[Card]) -> Vec<&Card> {
-    let mut found = vec![];
+    let mut found = Vec::with_capacity(cards.len());
     for card in cards {
         match &card.kind {
             CardKind::Choice(branches) => {
@@ -84,7 +82,7 @@ impl Usage {
     fn scope(
         &mut self,
         netlist: &Netlist,
-        cards: &[Card],
+        within: &[&Card],
         meant: &[Name],
         d: &mut Vec<Diagnostic>,
     ) {
@@ -94,8 +92,7 @@ impl Usage {
         for name in meant.iter().chain(meant) {
             self.count(*name);
         }
-        let within = every(cards);
-        for card in &within {
+        for card in within {
             match &card.kind {
                 CardKind::Device(device) => {
                     device.nodes.iter().for_each(|node| self.count(*node));
@@ -124,6 +121,9 @@ impl Usage {
                 }
                 // Once more, for what stands elsewhere.
                 CardKind::Global(nodes) => {
+                    if own == TOP {
+                        self.globals.extend(nodes.iter().copied());
+                    }
                     nodes.iter().chain(nodes).for_each(|node| self.count(*node));
                 }
                 CardKind::Save { items, .. } | CardKind::Fourier(Fourier { items, .. }) => {
@@ -135,13 +135,16 @@ impl Usage {
                         self.expr(expr);
                     })
                 }
-                CardKind::Analysis(Analysis::Transfer { output, .. }) => self.expr(&output.1),
-                CardKind::Analysis(Analysis::Sensitivity { outputs, .. }) => {
-                    outputs.iter().for_each(|(_, expr)| self.expr(expr));
-                }
-                CardKind::Analysis(Analysis::PoleZero { input, output, .. }) => {
-                    input.iter().chain(output).for_each(|node| self.count(*node));
-                }
+                CardKind::Analysis(analysis) => match &**analysis {
+                    Analysis::Transfer { output, .. } => self.expr(&output.1),
+                    Analysis::Sensitivity { outputs, .. } => {
+                        outputs.iter().for_each(|(_, expr)| self.expr(expr));
+                    }
+                    Analysis::PoleZero { input, output, .. } => {
+                        input.iter().chain(output).for_each(|node| self.count(*node));
+                    }
+                    _ => {}
+                },
                 CardKind::Measure(measure) => {
                     read::measure::expressions(&measure.kind, &mut |expr| self.expr(expr));
                 }
@@ -150,7 +153,9 @@ impl Usage {
         }
         let once =
             |counts: &[(u32, u8)], name: &Name| counts.get(name.0 as usize) == Some(&(own, 1));
-        for card in &within {
+        // Mostly there is none, and the cards need not be gone through again.
+        let any = self.counts.contains(&(own, 1));
+        for card in within.iter().filter(|_| any) {
             let CardKind::Device(device) = &card.kind else { continue };
             if matches!(device.element, Element::Instance { .. }) {
                 // An output of a subcircuit that nobody needs.
@@ -165,12 +170,12 @@ impl Usage {
                 }
             }
         }
-        for card in &within {
+        for card in within {
             if let CardKind::Subcircuit(subcircuit) = &card.kind {
                 // A terminal is named outside as well.
                 let meant: Vec<Name> =
                     subcircuit.ports.iter().chain(&self.globals).copied().collect();
-                self.scope(netlist, &subcircuit.cards, &meant, d);
+                self.scope(netlist, &every(&subcircuit.cards), &meant, d);
             }
         }
     }

@@ -113,15 +113,15 @@ impl<'f, 'n> Lookup<'f, 'n> {
     ) -> Option<DeviceId> {
         let text = self.names.text(name);
         let scope = self.flat.scopes.get(id);
-        let here = |device: &&DeviceId| {
+        let here = |device: &DeviceId| {
             // The name of an instance stands before the number of its first device.
             self.flat
                 .devices
                 .get(device.0 as usize)
                 .is_some_and(|pending| pending.device.name == name && pending.scope == id)
         };
-        if let Some(device) = scope.devices.get(&name).filter(here) {
-            return Some(*device);
+        if let Some(device) = scope.device(name).filter(here) {
+            return Some(device);
         }
         let text = &text.replace(':', ".");
         if let Some((first, rest)) = text.split_once('.') {
@@ -201,10 +201,10 @@ impl<'f, 'n> Lookup<'f, 'n> {
         let scope = self.flat.scopes.get(id);
         let global = || {
             let known = self.flat.scopes.globals.contains_key(&name);
-            known.then(|| self.flat.scopes.get(scope::TOP).nodes.get(&name)).flatten()
+            known.then(|| self.flat.scopes.get(scope::TOP).node(name)).flatten()
         };
-        if let Some(node) = scope.nodes.get(&name).or_else(global) {
-            return Some(*node);
+        if let Some(node) = scope.node(name).or_else(global) {
+            return Some(node);
         }
         if !text.contains(['.', ':']) {
             return None;
@@ -216,7 +216,7 @@ impl<'f, 'n> Lookup<'f, 'n> {
         let own = self.names.find(text.rsplit(['.', ':']).next()?)?;
         let around = path.rsplit_once('.')?.0;
         let inner = *self.paths().scopes.get(&format!("{around}."))?;
-        self.flat.scopes.get(inner).nodes.get(&own).copied()
+        self.flat.scopes.get(inner).node(own)
     }
 
     /// v·i of a device between its first two nodes.

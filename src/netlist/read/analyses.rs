@@ -17,7 +17,7 @@ use crate::netlist::{CardKind, Expr, Leaf, Name, Names, Part};
 
 /// `.dc`.
 pub fn dc(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    Some(CardKind::Analysis(Analysis::Dc(sweeps(reader, cursor)?)))
+    Some(CardKind::Analysis(Box::new(Analysis::Dc(sweeps(reader, cursor)?))))
 }
 
 /// `.step`.
@@ -179,7 +179,7 @@ fn list(reader: &mut Reader, cursor: &mut Cursor) -> Option<Vec<Expr>> {
 
 /// `.ac`.
 pub fn ac(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
-    Some(CardKind::Analysis(Analysis::Ac(frequencies(reader, cursor)?)))
+    Some(CardKind::Analysis(Box::new(Analysis::Ac(frequencies(reader, cursor)?))))
 }
 
 /// `lin|dec|oct n from to`, `list …`, `data=…`.
@@ -216,7 +216,7 @@ pub fn transfer(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
         return None;
     }
     let source = reader.names.intern(word);
-    Some(CardKind::Analysis(Analysis::Transfer { output, source }))
+    Some(CardKind::Analysis(Box::new(Analysis::Transfer { output, source })))
 }
 
 /// The word after which `.pz` counts.
@@ -237,7 +237,7 @@ pub fn pole_zero(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind> {
     };
     let drive = [Drive::Voltage, Drive::Current][word(&["vol", "cur"])?];
     let roots = [Roots::Poles, Roots::Zeros, Roots::Both][word(&["pol", "zer", "pz"])?];
-    Some(CardKind::Analysis(Analysis::PoleZero { input, output, drive, roots }))
+    Some(CardKind::Analysis(Box::new(Analysis::PoleZero { input, output, drive, roots })))
 }
 
 /// One output: v(a), v(a, b), i(device).

@@ -2,7 +2,7 @@
 
 use super::{Cursor, Reader, linked, passive, waveforms};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::{Device, Element, Expr, Name, PassiveKind};
+use crate::netlist::{Device, Element, Expr, Name, Nodes, PassiveKind};
 
 /// One row of the table: a letter, the number of nodes that its card names first, and what follows them.
 pub struct Letter {
@@ -12,7 +12,7 @@ pub struct Letter {
     pub nodes: usize,
     /// How a card goes, for messages.
     pub form: &'static str,
-    read: fn(&mut Reader, &mut Cursor, &mut Vec<Name>) -> Option<Element>,
+    read: fn(&mut Reader, &mut Cursor, &mut Nodes<Name>) -> Option<Element>,
 }
 
 /// Every letter that is read.
@@ -22,8 +22,8 @@ pub const LETTERS: &[Letter] = &[
     Letter { letter: b'C', nodes: 2, form: "Cname n+ n- value [model] [ic=volts], or C={expression}, Q={expression}", read: |r, c, n| passive::read(r, c, n, PassiveKind::Capacitor) },
     Letter { letter: b'L', nodes: 2, form: "Lname n+ n- value [model] [ic=amperes], or L={expression}, Flux={expression}", read: |r, c, n| passive::read(r, c, n, PassiveKind::Inductor) },
     Letter { letter: b'K', nodes: 0, form: "Kname L1 L2 … coupling", read: mutual },
-    Letter { letter: b'V', nodes: 2, form: "Vname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::VoltageSource(waveforms::source(r, c)?)) },
-    Letter { letter: b'I', nodes: 2, form: "Iname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::CurrentSource(waveforms::source(r, c)?)) },
+    Letter { letter: b'V', nodes: 2, form: "Vname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::VoltageSource(Box::new(waveforms::source(r, c)?))) },
+    Letter { letter: b'I', nodes: 2, form: "Iname n+ n- [[DC] value] [AC magnitude phase] [PULSE(…) | SIN(…) | PWL(…) | EXP(…) | SFFM(…) | AM(…) | PAT(…)]", read: |r, c, _| Some(Element::CurrentSource(Box::new(waveforms::source(r, c)?))) },
     Letter { letter: b'E', nodes: 2, form: "Ename n+ n- c+ c- gain, or VALUE={expression}, POLY(n) …, TABLE {x} = (x,y) …, LAPLACE {x} = {H(s)}", read: linked::vcvs },
     Letter { letter: b'G', nodes: 2, form: "Gname n+ n- c+ c- gain, or VALUE={expression}, POLY(n) …, TABLE {x} = (x,y) …, LAPLACE {x} = {H(s)}", read: linked::vccs },
     Letter { letter: b'F', nodes: 2, form: "Fname n+ n- device gain, or POLY(n) device … coefficients", read: linked::cccs },
@@ -92,8 +92,12 @@ pub fn device(reader: &mut Reader, cursor: &mut Cursor) -> Option<Device> {
     Some(Device { name, nodes, element })
 }
 
-fn element(reader: &mut Reader, cursor: &mut Cursor, row: &Letter) -> Option<(Vec<Name>, Element)> {
-    let mut nodes = Vec::with_capacity(row.nodes);
+fn element(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    row: &Letter,
+) -> Option<(Nodes<Name>, Element)> {
+    let mut nodes = Nodes::new();
     for k in 0..row.nodes {
         nodes.push(reader.node(cursor, if k == 0 { "the first node" } else { "the second node" })?);
     }
@@ -102,7 +106,7 @@ fn element(reader: &mut Reader, cursor: &mut Cursor, row: &Letter) -> Option<(Ve
     Some((nodes, element))
 }
 
-fn mutual(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+fn mutual(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     let mut inductors = vec![];
     while cursor.next_word().starts_with(['l', 'L', 'x', 'X']) {
         let (word, at) = cursor.word();
@@ -145,7 +149,7 @@ fn state(cursor: &mut Cursor) -> Option<bool> {
 }
 
 /// `c+ c- model`, or `model CONTROL={expression}`; ON or OFF anywhere behind.
-fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     if let Some(element) = law_switch(reader, cursor)? {
         return Some(element);
     }
@@ -158,7 +162,11 @@ fn switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option
     })
 }
 
-fn current_switch(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+fn current_switch(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    _: &mut Nodes<Name>,
+) -> Option<Element> {
     if let Some(element) = law_switch(reader, cursor)? {
         return Some(element);
     }
@@ -186,7 +194,7 @@ fn law_switch(reader: &mut Reader, cursor: &mut Cursor) -> Option<Option<Element
 }
 
 /// Z0 and TD, or F and NL (a quarter of a wave where it is left out): TD = NL/F.
-fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {
+fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Nodes<Name>) -> Option<Element> {
     for what in ["the third node", "the fourth node"] {
         nodes.push(reader.node(cursor, what)?);
     }
@@ -206,7 +214,7 @@ fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Opti
                     cursor.loose();
                     values.push(reader.value(cursor, "an initial value")?);
                 }
-                initial = <[Expr; 4]>::try_from(values).ok();
+                initial = <[Expr; 4]>::try_from(values).ok().map(Box::new);
                 cursor.loose();
             }
             other => {
@@ -229,7 +237,7 @@ fn line(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Opti
     Some(Element::Line { impedance: impedance?, delay: delay.or(by_length)?, initial })
 }
 
-fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     let model = model(reader, cursor)?;
     let (mut area, mut parameters) = (None, vec![]);
     while !cursor.is_done() {
@@ -257,7 +265,7 @@ fn diode(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<
     Some(Element::Diode { model, area, parameters })
 }
 
-fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Vec<Name>) -> Option<Element> {
+fn instance(reader: &mut Reader, cursor: &mut Cursor, nodes: &mut Nodes<Name>) -> Option<Element> {
     let mut words = vec![];
     loop {
         let mut ahead = *cursor;

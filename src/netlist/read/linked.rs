@@ -3,7 +3,7 @@
 use super::{Cursor, Reader, expression, passive};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Node};
-use crate::netlist::{Element, Expr, Leaf, Name, Operator};
+use crate::netlist::{Element, Expr, Leaf, Name, Nodes, Operator};
 use crate::source::Span;
 use std::sync::Arc;
 
@@ -99,7 +99,7 @@ fn voltage(reader: &Reader, plus: Name, minus: Name) -> Expr {
 }
 
 /// E.
-pub fn vcvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+pub fn vcvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     Some(match linked(reader, cursor)? {
         Linked::Gain(gain, control) => Element::Vcvs { gain, control },
         Linked::Law(law) => Element::BehaviouralVoltage { law },
@@ -107,7 +107,7 @@ pub fn vcvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Opti
 }
 
 /// G.
-pub fn vccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+pub fn vccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     Some(match linked(reader, cursor)? {
         Linked::Gain(gain, control) => Element::Vccs { gain, control },
         Linked::Law(law) => Element::BehaviouralCurrent { law },
@@ -139,7 +139,7 @@ fn current(reader: &mut Reader, cursor: &mut Cursor) -> Option<Current> {
 }
 
 /// F.
-pub fn cccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+pub fn cccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     Some(match current(reader, cursor)? {
         Current::Gain(gain, control) => Element::Cccs { gain, control },
         Current::Law(law) => Element::BehaviouralCurrent { law },
@@ -147,7 +147,7 @@ pub fn cccs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Opti
 }
 
 /// H.
-pub fn ccvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+pub fn ccvs(reader: &mut Reader, cursor: &mut Cursor, _: &mut Nodes<Name>) -> Option<Element> {
     Some(match current(reader, cursor)? {
         Current::Gain(gain, control) => Element::Ccvs { gain, control },
         Current::Law(law) => Element::BehaviouralVoltage { law },
@@ -165,7 +165,11 @@ pub fn control(reader: &mut Reader, cursor: &mut Cursor) -> Option<Name> {
 }
 
 /// B: `V=`, `I=`, and LTspice's `R=`.
-pub fn behavioural(reader: &mut Reader, cursor: &mut Cursor, _: &mut Vec<Name>) -> Option<Element> {
+pub fn behavioural(
+    reader: &mut Reader,
+    cursor: &mut Cursor,
+    _: &mut Nodes<Name>,
+) -> Option<Element> {
     let here = cursor.here(reader);
     match cursor.key() {
         Some(("v" | "V", _)) => Some(Element::BehaviouralVoltage { law: law(reader, cursor)? }),

@@ -20,7 +20,7 @@ pub fn sensitivity(reader: &mut Reader, cursor: &mut Cursor) -> Option<CardKind>
     let mut ahead = *cursor;
     let keyed = ahead.key().is_some_and(|(key, _)| KEYS.contains(&key.to_lowercase().as_str()));
     let analysis = if keyed { listed(reader, cursor)? } else { plain(reader, cursor)? };
-    Some(CardKind::Analysis(analysis))
+    Some(CardKind::Analysis(Box::new(analysis)))
 }
 
 /// ngspice's form; `param=` may stand at its end.

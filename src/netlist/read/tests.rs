@@ -3,7 +3,7 @@
 use super::*;
 use crate::expr::Node;
 use crate::netlist::analysis::Print;
-use crate::netlist::{Device, Element, Expr, Leaf, Shape, Source, Waveform};
+use crate::netlist::{Device, Element, Expr, Leaf, Shape, Waveform};
 use proptest::prelude::*;
 
 fn read_text(text: &str) -> (Netlist, Vec<Diagnostic>) {
@@ -93,7 +93,7 @@ fn sources_and_their_waveforms() {
     }
     let (_, v) = device("V1 a b");
     assert!(
-        matches!(&v.element, Element::VoltageSource(Source { waveform: Waveform::Constant(value), .. }) if number(value) == 0.0)
+        matches!(&v.element, Element::VoltageSource(source) if matches!(&source.waveform, Waveform::Constant(value) if number(value) == 0.0))
     );
 }
 
@@ -322,22 +322,28 @@ fn deep_nesting_is_refused() {
     drop(netlist);
 }
 
-/// A million lines in a second on the machine that this was written on; here ten times fewer, with a wide margin.
+/// Reading takes time in proportion to the lines: eight times as many take less than 24 times as long, on a machine that
+/// does other things meanwhile.
 #[test]
-fn big_decks_are_read_fast() {
+fn the_time_of_reading_grows_with_the_lines() {
     use std::fmt::Write;
-    let mut text = String::from("ladder\n");
-    for k in 0..50_000 {
-        let _ = write!(text, "R{k} n{k} n{} 1\nC{k} n{} 0 1u\n", k + 1, k + 1);
-    }
-    let start = std::time::Instant::now();
-    let (netlist, d) = read_text(&text);
-    let time = start.elapsed();
-    assert!(d.is_empty());
-    assert_eq!(netlist.cards.len(), 100_000);
-    let rate = 100_000.0 / time.as_secs_f64();
-    println!("{rate:.3e} lines a second");
-    assert!(rate > 5e4, "{rate:.3e} lines a second");
+    let seconds = |count: usize| {
+        let mut text = String::from("ladder\n");
+        for k in 0..count {
+            let _ = write!(text, "R{k} n{k} n{} 1\nC{k} n{} 0 1u\n", k + 1, k + 1);
+        }
+        let once = || {
+            let start = std::time::Instant::now();
+            let (netlist, d) = read_text(&text);
+            let time = start.elapsed().as_secs_f64();
+            assert!(d.is_empty());
+            assert_eq!(netlist.cards.len(), 2 * count);
+            time
+        };
+        once().min(once()).min(once())
+    };
+    let (few, many) = (seconds(5000), seconds(40_000));
+    assert!(many < 24.0 * few, "{few:.3} s and {many:.3} s");
 }
 
 const PIECES: &[&str] = &[

@@ -8,7 +8,7 @@
 //! Steps grow by less than 1 + √2, within which the method is stable. After a corner one TR-BDF2 step is taken.
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.5.
 
-use super::trapezoidal::second_difference;
+use super::trapezoidal::{led_away, second_difference};
 use super::{Work, filtered_error, trbdf2, weighted};
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
@@ -21,28 +21,37 @@ pub(crate) fn step(
     weights: &[f64],
     work: &mut Work,
 ) -> Result<f64, Cut> {
-    let Some(before) = work.before else {
+    let Some(before) = work.history.before() else {
         return trbdf2::step(network, from, to, weights, work);
     };
     let h = to.t - from.t;
     let last = from.t - before;
     let ratio = h / last;
     let alpha = (1.0 + 2.0 * ratio) / (1.0 + ratio) / h;
-    let Work { beta, sum, error, dense, scratch, q_before, w_before, .. } = work;
-    to.x.copy_from_slice(&from.x);
+    let unconfirmed = work.unconfirmed;
+    let Work { beta, sum, error, dense, scratch, history, x, .. } = work;
+    let missed = history.predict(from, to.t, x);
+    to.x.copy_from_slice(x);
     network.remember_junctions(&from.x);
     for (k, beta) in beta.iter_mut().enumerate() {
-        *beta = (ratio * ratio / (1.0 + ratio) * q_before[k] - (1.0 + ratio) * from.q[k]) / h;
+        *beta = (ratio * ratio / (1.0 + ratio) * history.q[k] - (1.0 + ratio) * from.q[k]) / h;
     }
-    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION };
+    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION, unconfirmed };
     solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
     let constant = (1.0 + ratio) * (1.0 + ratio) / (ratio * (1.0 + 2.0 * ratio));
-    for k in 0..to.q.len() {
-        to.w[k] = alpha * to.q[k] + beta[k];
-        let third = 2.0 * second_difference(h, last, w_before[k], from.w[k], to.w[k]);
-        sum[k] = h * h * h / 6.0 * constant * third;
+    for (k, rate) in to.w.iter_mut().enumerate() {
+        *rate = alpha * to.q[k] + beta[k];
     }
-    filtered_error(network, alpha, sum, error);
-    dense.hermite(from, to);
+    match missed {
+        Some(missed) => led_away(constant / (6.0 * missed + constant), x, &to.x, error),
+        None => {
+            for (k, sum) in sum.iter_mut().enumerate() {
+                let third = 2.0 * second_difference(h, last, history.w[k], from.w[k], to.w[k]);
+                *sum = h * h * h / 6.0 * constant * third;
+            }
+            filtered_error(network, alpha, sum, error);
+        }
+    }
+    dense.hermite(history, from, to);
     Ok(weighted(error, weights))
 }

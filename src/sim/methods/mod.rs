@@ -1,10 +1,12 @@
 //! Integration methods: each takes one step of a given size and estimates its local error.
 
 pub mod gear2;
+pub mod history;
 pub mod rodas;
 pub mod trapezoidal;
 pub mod trbdf2;
 
+use self::history::History;
 use super::network::Network;
 use super::newton::{Cut, Scratch};
 use super::op::State;
@@ -76,6 +78,9 @@ impl Method {
     }
 }
 
+/// Why a Rosenbrock method is chosen.
+pub(crate) const SMOOTH: &str = "smooth equations of index 1";
+
 /// The method that suits a circuit, and why.
 pub(crate) fn choose(network: &Network, index2: bool) -> (Method, &'static str) {
     if index2 {
@@ -83,7 +88,16 @@ pub(crate) fn choose(network: &Network, index2: bool) -> (Method, &'static str) 
     } else if network.system.has_junctions() {
         (Method::TrBdf2, "exponential junctions")
     } else {
-        (Method::Rodas5p, "smooth equations of index 1")
+        (Method::Rodas5p, SMOOTH)
+    }
+}
+
+/// error^(−1/p), by which a step may grow, for the power p of a method's error.
+pub(crate) fn growth(error: f64, power: f64) -> f64 {
+    match power {
+        3.0 => libm::cbrt(error).recip(),
+        4.0 => error.sqrt().sqrt().recip(),
+        _ => libm::pow(error, -1.0 / power),
     }
 }
 
@@ -121,8 +135,9 @@ impl Dense {
         third.fill(0.0);
     }
 
-    /// Cubic polynomials of the charges through their values and rates at both ends; straight lines of the unknowns.
-    pub fn hermite(&mut self, from: &State, to: &State) {
+    /// Cubic polynomials of the charges through their values and rates at both ends; parabolas of the unknowns through the
+    /// point before.
+    pub fn hermite(&mut self, history: &History, from: &State, to: &State) {
         self.by_unknowns = false;
         let h = to.t - from.t;
         for k in 0..from.q.len() {
@@ -131,12 +146,22 @@ impl Dense {
             self.q[1][k] = 2.0 * change - h * (from.w[k] + to.w[k]);
             self.q[2][k] = 0.0;
         }
-        self.x.iter_mut().for_each(|k| k.fill(0.0));
+        let [first, second, third] = &mut self.x;
+        history.bend(from, to, first);
+        second.fill(0.0);
+        third.fill(0.0);
     }
 
     /// The unknowns at a part of the step.
     pub fn unknowns(&self, theta: f64, from: &State, to: &State, out: &mut [f64]) {
         interpolate(theta, &from.x, &to.x, &self.x, out);
+    }
+
+    /// One unknown at a part of the step.
+    pub fn unknown(&self, i: usize, theta: f64, from: &State, to: &State) -> f64 {
+        let rest = 1.0 - theta;
+        let inner = self.x[0][i] + theta * (self.x[1][i] + theta * self.x[2][i]);
+        rest * from.x[i] + theta * (to.x[i] + rest * inner)
     }
 
     /// The charges at a part of the step.
@@ -174,10 +199,10 @@ pub(crate) struct Work {
     pub rate_floors: Vec<f64>,
     pub dense: Dense,
     pub scratch: Scratch,
-    /// The time before the last, for methods of several steps; `None` after a restart.
-    pub before: Option<f64>,
-    pub q_before: Vec<f64>,
-    pub w_before: Vec<f64>,
+    /// The weighted error that iterations may leave without a test.
+    pub unconfirmed: f64,
+    /// The steps before, for methods of several steps.
+    pub history: History,
     /// Whether the laws' derivatives are those at the left end of the step.
     pub linearised: bool,
 }
@@ -199,18 +224,10 @@ impl Work {
             rate_floors: vec![0.0; charges],
             dense: Dense::new(n, charges),
             scratch: Scratch::new(n, charges),
-            before: None,
-            q_before: vec![0.0; charges],
-            w_before: vec![0.0; charges],
+            unconfirmed: 0.0,
+            history: History::new(n, charges),
             linearised: false,
         }
-    }
-
-    /// Keeps the left end of an accepted step for methods of several steps.
-    pub fn remember(&mut self, from: &State) {
-        self.before = Some(from.t);
-        self.q_before.copy_from_slice(&from.q);
-        self.w_before.copy_from_slice(&from.w);
     }
 }
 

@@ -1,12 +1,17 @@
 //! The trapezoidal rule on charges and fluxes: Q₁ = Q₀ + h/2·(Q'₀ + Q'₁), order 2, A-stable.
 //!
 //! Algebraic equations hold at the step's right end, so that they do not ring; stiff charges do. The local error
-//! h³/12·Q''' comes from the rates at three points; after a corner, where there are no three, one TR-BDF2 step is taken.
+//! h³/12·x''' comes from how far the step leads away from the parabola through the points before it, and costs nothing;
+//! where there are not yet enough of them, h³/12·Q''' from the rates at three points. After a corner, where there is no
+//! past at all, one TR-BDF2 step is taken.
 
 use super::{Work, filtered_error, trbdf2, weighted};
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::State;
+
+/// The local error is this part of h³·x'''.
+const ERROR: f64 = 1.0 / 12.0;
 
 pub(crate) fn step(
     network: &mut Network,
@@ -15,27 +20,44 @@ pub(crate) fn step(
     weights: &[f64],
     work: &mut Work,
 ) -> Result<f64, Cut> {
-    let Some(before) = work.before else {
+    let Some(before) = work.history.before() else {
         return trbdf2::step(network, from, to, weights, work);
     };
     let h = to.t - from.t;
     let alpha = 2.0 / h;
-    let Work { beta, sum, error, dense, scratch, w_before, .. } = work;
-    to.x.copy_from_slice(&from.x);
+    let unconfirmed = work.unconfirmed;
+    let Work { beta, sum, error, dense, scratch, history, x, .. } = work;
+    let missed = history.predict(from, to.t, x);
+    to.x.copy_from_slice(x);
     network.remember_junctions(&from.x);
     for (k, beta) in beta.iter_mut().enumerate() {
         *beta = -alpha * from.q[k] - from.w[k];
     }
-    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION };
+    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION, unconfirmed };
     solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
-    let last = from.t - before;
-    for k in 0..to.q.len() {
-        to.w[k] = alpha * to.q[k] + beta[k];
-        sum[k] = h * h * h / 6.0 * second_difference(h, last, w_before[k], from.w[k], to.w[k]);
+    for (k, rate) in to.w.iter_mut().enumerate() {
+        *rate = alpha * to.q[k] + beta[k];
     }
-    filtered_error(network, alpha, sum, error);
-    dense.hermite(from, to);
+    match missed {
+        Some(missed) => led_away(ERROR / (missed + ERROR), x, &to.x, error),
+        None => {
+            let last = from.t - before;
+            for (k, sum) in sum.iter_mut().enumerate() {
+                let second = second_difference(h, last, history.w[k], from.w[k], to.w[k]);
+                *sum = h * h * h / 6.0 * second;
+            }
+            filtered_error(network, alpha, sum, error);
+        }
+    }
+    dense.hermite(history, from, to);
     Ok(weighted(error, weights))
+}
+
+/// The error of a step that led elsewhere than predicted.
+pub(super) fn led_away(part: f64, predicted: &[f64], reached: &[f64], error: &mut [f64]) {
+    for ((error, reached), predicted) in error.iter_mut().zip(reached).zip(predicted) {
+        *error = part * (reached - predicted);
+    }
 }
 
 /// The second divided difference over steps `last` and `h`: half a second derivative.

@@ -33,6 +33,7 @@ pub(crate) fn step(
     const W: f64 = SQRT_2 / 4.0;
     let h = to.t - from.t;
     let alpha = 1.0 / (D * h);
+    let unconfirmed = work.unconfirmed;
     let Work { x, q, w, beta, sum, error, rate_weights, rate_floors, dense, scratch, .. } = work;
 
     x.copy_from_slice(&from.x);
@@ -41,7 +42,7 @@ pub(crate) fn step(
         *beta = -alpha * from.q[k] - from.w[k];
     }
     let middle = from.t + GAMMA * h;
-    let stage = Stage { t: middle, alpha, beta, weights, tolerance: ITERATION };
+    let stage = Stage { t: middle, alpha, beta, weights, tolerance: ITERATION, unconfirmed };
     solve_stage(network, &stage, x, q, scratch)?;
     for (k, w) in w.iter_mut().enumerate() {
         *w = alpha * q[k] + beta[k];
@@ -53,7 +54,7 @@ pub(crate) fn step(
     for (k, beta) in beta.iter_mut().enumerate() {
         *beta = -alpha * (from.q[k] + h * W * (from.w[k] + w[k]));
     }
-    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: ITERATION };
+    let stage = Stage { t: to.t, alpha, beta, weights, tolerance: ITERATION, unconfirmed };
     network.remember_junctions(x);
     solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
     for (k, rate) in to.w.iter_mut().enumerate() {

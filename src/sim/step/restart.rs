@@ -87,7 +87,9 @@ impl Run<'_> {
 
     /// Consistent values for the charges of `state`.
     pub(super) fn restart(&mut self, moment: Moment) -> Result<(), Failure> {
-        self.work.before = None;
+        self.work.history.forget();
+        self.work.scratch.forget_bend();
+        self.work.unconfirmed = 0.0;
         self.work.linearised = false;
         self.last = None;
         self.fresh = true;
@@ -257,6 +259,7 @@ impl Run<'_> {
             beta: &work.beta,
             weights,
             tolerance: methods::trbdf2::ITERATION,
+            unconfirmed: 0.0,
         };
         solve_stage(network, &stage, &mut next.x, &mut next.q, &mut work.scratch)?;
         for (k, w) in next.w.iter_mut().enumerate() {

@@ -137,7 +137,7 @@ impl Run<'_> {
         }
         std::mem::swap(state, next);
         work.linearised = false;
-        work.before = None;
+        work.history.forget();
         let Run { network, state, controls, .. } = self;
         network.controls(&state.x, state.t, &mut controls.left);
         true

@@ -407,7 +407,7 @@ impl Writer<'_> {
             None => what,
         };
         let element = Element::Instance { subcircuit: *subcircuit, parameters };
-        let kind = CardKind::Device(Device { name, nodes, element });
+        let kind = CardKind::Device(Device { name, nodes: nodes.into(), element });
         Some(Card { kind, span: instance.span, comment: Some(comment) })
     }
 

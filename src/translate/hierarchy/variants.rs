@@ -2,7 +2,7 @@
 
 use super::bodies::Lift;
 use super::words::Words;
-use crate::netlist::{Card, CardKind, Expr, Leaf, Name, Subcircuit, write};
+use crate::netlist::{Card, CardKind, Expr, Leaf, Name, Nodes, Subcircuit, write};
 use crate::source::Span;
 use crate::translate::names::Namer;
 use std::collections::BTreeSet;
@@ -197,7 +197,7 @@ fn difference(first: &Body, body: &Body, names: &Words) -> String {
     if devices(first, 0) != devices(body, 0) {
         return "causality".to_string();
     }
-    let nodes = |body: &Body, turned: bool| -> Vec<Vec<Name>> {
+    let nodes = |body: &Body, turned: bool| -> Vec<Nodes<Name>> {
         let devices = body.cards.iter().filter_map(|card| match &card.kind {
             CardKind::Device(device) => Some(device.nodes.clone()),
             _ => None,

@@ -465,7 +465,7 @@ impl<'t, F: Modular> Wires<'t, F> {
                     }
                     (_, Some(initial)) => {
                         let mut values = [F::ZERO; 4];
-                        for (value, expr) in values.iter_mut().zip(initial) {
+                        for (value, expr) in values.iter_mut().zip(initial.iter()) {
                             *value = self.number(pending_scope, expr)?;
                         }
                         values

@@ -1,0 +1,99 @@
+//! What steps leave behind: the points of the past, and the parabola of the unknowns that leads on from them.
+//!
+//! ```text
+//! xₚ(t₀ + h) = x₀ + h·x[t₀, t₋₁] + h·(h + h₋₁)·x[t₀, t₋₁, t₋₂]        missed by  P·x''',  P = h·(h + h₋₁)·(h + h₋₁ + h₋₂)/6
+//! ```
+//!
+//! A method of order 2 misses by E·x''' with a factor of its own, so that what it makes of a step differs from the
+//! prediction by (P + E)·x''', and its error is E/(P + E) times that difference (W. E. Milne's device; E. Hairer,
+//! S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.7).
+
+use crate::sim::op::State;
+
+/// The left ends of the last accepted steps, the latest first.
+#[derive(Debug)]
+pub(crate) struct History {
+    times: [f64; 2],
+    x: [Vec<f64>; 2],
+    count: usize,
+    /// Charges and rates at the latest.
+    pub q: Vec<f64>,
+    pub w: Vec<f64>,
+}
+
+impl History {
+    pub fn new(n: usize, charges: usize) -> History {
+        History {
+            times: [0.0; 2],
+            x: [vec![0.0; n], vec![0.0; n]],
+            count: 0,
+            q: vec![0.0; charges],
+            w: vec![0.0; charges],
+        }
+    }
+
+    /// Nothing of the past tells of what is to come.
+    pub fn forget(&mut self) {
+        self.count = 0;
+    }
+
+    /// Takes the left end of an accepted step.
+    pub fn remember(&mut self, from: &State) {
+        self.times[1] = self.times[0];
+        self.times[0] = from.t;
+        self.x.swap(0, 1);
+        self.x[0].copy_from_slice(&from.x);
+        self.q.copy_from_slice(&from.q);
+        self.w.copy_from_slice(&from.w);
+        self.count = (self.count + 1).min(2);
+    }
+
+    /// The time before the last, if the past says anything.
+    pub fn before(&self) -> Option<f64> {
+        (self.count > 0).then_some(self.times[0])
+    }
+
+    /// Puts the prediction for a time into `x`. Gives P/h³ where it is that of a parabola.
+    pub fn predict(&self, from: &State, time: f64, x: &mut [f64]) -> Option<f64> {
+        let h = time - from.t;
+        let last = from.t - self.times[0];
+        match self.count {
+            0 => {
+                x.copy_from_slice(&from.x);
+                None
+            }
+            1 => {
+                let part = h / last;
+                for ((x, now), before) in x.iter_mut().zip(&from.x).zip(&self.x[0]) {
+                    *x = now + part * (now - before);
+                }
+                None
+            }
+            _ => {
+                // x₀ + a·(x₀ − x₋₁) + b·(x₋₁ − x₋₂)
+                let first = self.times[0] - self.times[1];
+                let bend = h * (h + last) / (last + first);
+                let (a, b) = (h / last + bend / last, -bend / first);
+                let past = self.x[0].iter().zip(&self.x[1]);
+                for ((x, now), (before, earlier)) in x.iter_mut().zip(&from.x).zip(past) {
+                    *x = now + a * (now - before) + b * (before - earlier);
+                }
+                Some((h + last) * (h + last + first) / (6.0 * h * h))
+            }
+        }
+    }
+
+    /// k₁ of the parabolas through the point before, and the two ends of a step; 0 where there is no point before.
+    pub fn bend(&self, from: &State, to: &State, k: &mut [f64]) {
+        if self.count == 0 {
+            k.fill(0.0);
+            return;
+        }
+        let (h, last) = (to.t - from.t, from.t - self.times[0]);
+        let (a, b) = (h / (h + last), h * h / (last * (h + last)));
+        let points = to.x.iter().zip(&from.x).zip(&self.x[0]);
+        for (k, ((to, from), before)) in k.iter_mut().zip(points) {
+            *k = b * (from - before) - a * (to - from);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Stages next to the one before: the factors at hand serve, as long as it is known how fast iterations with them converge.
+//!
+//! An iteration with factors of an earlier stage leaves ρ times its update. ρ is measured by taking two of them; the stages
+//! after that are content with one whose update is small enough for what it leaves, and evaluate the laws without their
+//! derivatives. Now and then ρ is measured again. Where it is large, the stage is solved by Newton's method with new
+//! factors.
+
+use super::network::Network;
+use super::newton::{GROWN, MEASURED_AGAIN, Scratch, Stage, stage_residual};
+
+/// The largest update that no second one confirms: beyond a kink ρ is not what it was.
+const NEAR: f64 = 0.1;
+/// Iterations that converge more slowly than this ask for new factors,
+const SLOW: f64 = 0.25;
+/// and so many stages do without a try then, twice as many each time.
+const LONGEST_PAUSE: u32 = 64;
+
+/// What is known of iterations with the factors at hand.
+#[derive(Debug)]
+pub(crate) struct Near {
+    /// ρ; infinite where it is not known.
+    rate: f64,
+    /// Stages since it has been measured.
+    age: u32,
+    /// Stages that are still to do without, and how many the next time.
+    wait: u32,
+    pause: u32,
+}
+
+impl Near {
+    pub const UNKNOWN: Near = Near { rate: f64::INFINITY, age: 0, wait: 0, pause: 1 };
+
+    /// New factors: ρ is not known.
+    pub fn forget(&mut self) {
+        self.rate = f64::INFINITY;
+    }
+
+    fn failed(&mut self) {
+        self.rate = f64::INFINITY;
+        self.wait = self.pause;
+        self.pause = (2 * self.pause).min(LONGEST_PAUSE);
+    }
+}
+
+/// Solves a stage with the factors at hand. Says whether it has; otherwise `x` is a guess as good as before, or better.
+pub(crate) fn solve(
+    network: &mut Network,
+    stage: &Stage,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> bool {
+    if network.system.has_junctions() || !network.factors_serve(stage.alpha) {
+        return false;
+    }
+    if scratch.near.wait > 0 {
+        scratch.near.wait -= 1;
+        return false;
+    }
+    let n = x.len();
+    let Some(first) = iterate(network, stage, x, q, scratch) else { return false };
+    let Scratch { near, residual, .. } = scratch;
+    let known = GROWN * near.rate * first <= stage.unconfirmed && near.age < MEASURED_AGAIN;
+    if first == 0.0 || (known && first <= NEAR) {
+        near.age += 1;
+        network.add_charge_change(-1.0, &residual[..n], q);
+        return true;
+    }
+    let Some(second) = iterate(network, stage, x, q, scratch) else { return false };
+    let Scratch { near, residual, .. } = scratch;
+    let rate = second / first;
+    if rate > SLOW || rate / (1.0 - rate) * second > stage.unconfirmed {
+        near.failed();
+        return false;
+    }
+    (near.rate, near.age, near.pause) = (rate, 0, 1);
+    network.add_charge_change(-1.0, &residual[..n], q);
+    true
+}
+
+/// One iteration, with what it has subtracted from `x` in the residual's place. Gives its weighted size; nothing where it
+/// is no number.
+fn iterate(
+    network: &mut Network,
+    stage: &Stage,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> Option<f64> {
+    let n = x.len();
+    network.statistics.iterations += 1;
+    network.evaluate(x, stage.t);
+    network.charges(x, q);
+    let residual = &mut scratch.residual[..n];
+    stage_residual(network, stage, x, q, residual, &mut scratch.rates);
+    network.solve_dynamic(residual);
+    let mut update: f64 = 0.0;
+    for (dx, weight) in residual.iter().zip(stage.weights) {
+        let size = dx.abs() / weight;
+        // `max` would lose what is no number.
+        update = if size <= update { update } else { size };
+    }
+    if !update.is_finite() {
+        scratch.near.failed();
+        return None;
+    }
+    for (x, dx) in x.iter_mut().zip(residual.iter()) {
+        *x -= dx;
+    }
+    Some(update)
+}

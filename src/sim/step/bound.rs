@@ -1,0 +1,68 @@
+//! The method that suits a step limit: where the limit, not the error, sets the step, a method of fourth or fifth order
+//! pays for stages that gain nothing, and the trapezoidal rule takes the same steps with one solution each.
+
+use super::Run;
+use crate::sim::methods::{Method, SMOOTH};
+
+/// A step that the limit binds errs by less than this part of its tolerance,
+const SMALL: f64 = 0.05;
+/// and so many of them one after another change the method.
+const BOUND: u32 = 10;
+/// A step of the trapezoidal rule that errs by more than this part of its tolerance is as long as the error lets it be;
+const LARGE: f64 = 0.3;
+/// where that is less than this part of the limit, so many times, the other method comes back.
+const SHORT: f64 = 0.5;
+const STRUGGLES: u32 = 3;
+/// Each time it comes back the limit must bind this many times as long.
+const PATIENCE: u32 = 4;
+
+/// What the last steps say of the limit.
+#[derive(Default)]
+pub(super) struct Bound {
+    /// Steps, one after another, that the limit bound.
+    bound: u32,
+    /// Steps of the trapezoidal rule that it did not.
+    struggles: u32,
+    /// The method that was left for the trapezoidal rule.
+    left: Option<Method>,
+    /// How often it has come back.
+    returns: u32,
+}
+
+impl Run<'_> {
+    /// Changes the method where the step limit says so, and back. Only one that nobody asked for is changed, and one of
+    /// a circuit without junctions: theirs is of second order already.
+    pub(super) fn suit_limit(&mut self, error: f64, h: f64) {
+        let limit = match self.settings.hmax {
+            Some(limit) if self.settings.method == Method::Auto && self.detour == 0 => limit,
+            _ => return,
+        };
+        let bound = &mut self.bound;
+        match bound.left {
+            None if matches!(self.method, Method::Rodas4 | Method::Rodas5p) => {
+                let binds = error < SMALL && h > 0.99 * limit;
+                bound.bound = if binds { bound.bound + 1 } else { 0 };
+                if bound.bound >= BOUND * PATIENCE.saturating_pow(bound.returns) {
+                    bound.left = Some(self.method);
+                    (bound.bound, bound.struggles) = (0, 0);
+                    self.go_on_with(Method::Trapezoidal, "the step limit binds");
+                }
+            }
+            Some(other) if self.method == Method::Trapezoidal => {
+                bound.struggles += u32::from(error > LARGE && h < SHORT * limit);
+                if bound.struggles >= STRUGGLES {
+                    bound.left = None;
+                    bound.returns += 1;
+                    self.go_on_with(other, SMOOTH);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn go_on_with(&mut self, method: Method, reason: &str) {
+        (self.method, self.home) = (method, method);
+        self.network.statistics.method.replace_range(.., method.name());
+        self.network.statistics.reason.replace_range(.., reason);
+    }
+}
