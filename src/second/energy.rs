@@ -350,8 +350,10 @@ impl Meter {
 
     /// The worst junction or two-port: its power in parts of its own largest sum, and its name.
     pub fn worst(&self, graph: &BondGraph) -> (f64, String) {
+        // Numbers next to the smallest that there are have few digits.
+        const LEAST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
         let parts = self.nodes.iter().zip(&self.largest).map(|((id, _), (sum, size))| {
-            (if *size > 0.0 { sum / size } else { 0.0 }, graph.vertex(*id).name.clone())
+            (if *size > LEAST { sum / size } else { 0.0 }, graph.vertex(*id).name.clone())
         });
         parts.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, String::new()))
     }

@@ -62,8 +62,6 @@ pub(crate) struct Rows<'a> {
     /// The row at the left end of a step, and extremes of each column so far.
     left: Vec<f64>,
     middle: Vec<f64>,
-    /// The row at the right end.
-    right: Vec<f64>,
     /// Pieces of a step that are still to come, and rows that wait for use.
     pile: Vec<Piece>,
     spare: Vec<Vec<f64>>,
@@ -89,7 +87,6 @@ impl<'a> Rows<'a> {
             row: vec![0.0; columns + 1],
             left: vec![0.0; columns + 1],
             middle: vec![0.0; columns + 1],
-            right: vec![0.0; columns + 1],
             pile: Vec::with_capacity(MOST_HALVED as usize + 2),
             spare: (0..MOST_HALVED + 2).map(|_| vec![0.0; columns + 1]).collect(),
             low: vec![f64::INFINITY; columns],
@@ -214,10 +211,9 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
-        if self.is_straight(network, from, to, index2, work) {
-            return Ok(());
-        }
-        std::mem::swap(&mut self.row, &mut self.right);
+        // Whether columns are straight is read off the step's own polynomials, where it has those of all unknowns; only
+        // what is written is solved for. Parabolas through stages say little of junctions.
+        let smooth = !index2 && !work.dense.by_unknowns && !network.system.output_rates;
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;
@@ -233,8 +229,12 @@ impl<'a> Rows<'a> {
                 // A curve that swings about its line may cross it in the middle, and a bend may lie near an end.
                 for theta in [0.5, 0.25, 0.75] {
                     let time = left[0] + theta * span;
-                    self.inside.between(network, from, to, time, index2, weights, work)?;
-                    self.evaluate(network, time);
+                    if smooth {
+                        self.interpolate(network, from, to, time, work);
+                    } else {
+                        self.inside.between(network, from, to, time, index2, weights, work)?;
+                        self.evaluate(network, time);
+                    }
                     self.widen();
                     off = self.off_line(theta, &left, &right).max(off);
                     if theta == 0.5 {
@@ -249,6 +249,11 @@ impl<'a> Rows<'a> {
             // What does not become straighter is rounding.
             let straight = off <= STRAIGHT || (halved > 4 && off >= before);
             if !straight {
+                if smooth {
+                    let time = left[0] + 0.5 * span;
+                    self.inside.between(network, from, to, time, index2, weights, work)?;
+                    self.evaluate(network, time);
+                }
                 let middle = self.copy_of_row();
                 self.pile.push((right, halved + 1, off));
                 self.pile.push((middle, halved + 1, off));
@@ -276,47 +281,27 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Whether what the step's own polynomials make of the columns is straight without doubt, so that nothing need be solved
-    /// within the step. Leaves the present row, the step's end, in `self.right`.
-    fn is_straight(
+    /// Makes the row at a time within a step from the step's own polynomials, with nothing solved.
+    fn interpolate(
         &mut self,
         network: &mut Network,
         from: &State,
         to: &State,
-        index2: bool,
+        time: f64,
         work: &mut Work,
-    ) -> bool {
-        /// A part of what a line may be off by.
-        const SURE: f64 = 0.5;
-        // Parabolas through stages say little of junctions.
-        self.right.copy_from_slice(&self.row);
-        if index2 || work.dense.by_unknowns || network.system.output_rates {
-            return false;
-        }
-        let right = std::mem::take(&mut self.right);
-        let left = std::mem::take(&mut self.left);
-        let mut off: f64 = 0.0;
-        let plain = network.system.law_columns.is_empty();
-        for theta in [0.5, 0.25, 0.75] {
-            if plain {
-                for (column, unknown) in &network.system.plain_outputs {
-                    let value = work.dense.unknown(*unknown as usize, theta, from, to);
-                    self.row[*column as usize + 1] = value;
-                }
-            } else {
-                let time = from.t + theta * (to.t - from.t);
-                work.dense.unknowns(theta, from, to, &mut self.inside.point.x);
-                self.inside.point.t = time;
-                self.evaluate(network, time);
+    ) {
+        let theta = (time - from.t) / (to.t - from.t);
+        if network.system.law_columns.is_empty() {
+            self.row[0] = time;
+            for (column, unknown) in &network.system.plain_outputs {
+                let value = work.dense.unknown(*unknown as usize, theta, from, to);
+                self.row[*column as usize + 1] = value;
             }
-            off = off.max(self.off_line(theta, &left, &right));
-            if off.is_nan() || off > SURE * STRAIGHT {
-                break;
-            }
+            return;
         }
-        self.left = left;
-        self.right = right;
-        off <= SURE * STRAIGHT
+        work.dense.unknowns(theta, from, to, &mut self.inside.point.x);
+        self.inside.point.t = time;
+        self.evaluate(network, time);
     }
 
     /// Makes the row of a step's end, headed by a time.

@@ -5,6 +5,7 @@ mod crossing;
 pub(super) mod past;
 mod restart;
 mod rows;
+mod size;
 mod trouble;
 
 use self::bound::Bound;
@@ -342,7 +343,7 @@ impl<'a> Run<'a> {
                 Ok(error) => {
                     self.network.statistics.rejected.error += 1;
                     cuts.note(h, Reason::Error(self.worst_error(), error));
-                    h *= (0.9 * methods::growth(error, power)).clamp(0.1, 0.9);
+                    h *= size::after_error(error, power);
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
                 Err(Cut::NonFinite { .. }) if self.slope_by_time_is_infinite() => {
@@ -442,19 +443,7 @@ impl<'a> Run<'a> {
         self.end_detour();
         self.suit_limit(error, h);
         self.work.unconfirmed = UNCONFIRMED * error.max(NEGLIGIBLE);
-        let most = match self.method {
-            Method::Gear2 => 2.0,
-            _ => 6.0,
-        };
-        let size = error.max(1e-12);
-        let mut factor = 0.9 * methods::growth(size, power);
-        if let Some((last_error, last_h)) = self.last {
-            // Gustafsson's predictive controller: the error of the last step says how the solution changes.
-            let trend = h / last_h * methods::growth(size / last_error, power);
-            factor = factor.min(factor * trend.max(0.2)).max(0.2);
-        }
-        let factor = factor.clamp(0.2, if failed { 1.0 } else { most });
-        self.last = Some((size.max(1e-2), h));
+        let factor = self.factor(error, h, failed, power);
         // A step that was clipped says little against the size that had been planned.
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };
         if let Some(rows) = &mut self.rows {

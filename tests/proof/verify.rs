@@ -307,6 +307,21 @@ fn of_text(text: &str) -> Result<Report, Vec<Diagnostic>> {
     }
 }
 
+/// The far end of a long ladder has powers next to the smallest number there is, whose digits say nothing.
+#[test]
+fn a_ladder_whose_far_end_hardly_moves_keeps_its_energy() {
+    let mut text = String::from("Se:V(1) -> 1:j1\n");
+    for k in 1..=300 {
+        text += &format!("j{k} -> R:R{k}(1)\nj{k} -> 0:n{k}\nn{k} -> C:C{k}(1e-6)\n");
+        if k < 300 {
+            text += &format!("n{k} -> 1:j{}\n", k + 1);
+        }
+    }
+    text += "simulate until 1 us step 0.1 us\nobserve e(n1)\n";
+    let report = of_text(&text).expect("it has a solution");
+    assert!(report.passes(), "{}", report.text());
+}
+
 #[test]
 fn what_cannot_be_solved_is_told_in_the_words_of_the_graph() {
     // The table ends at an effort of 20, and the gyrator asks for more from t = 20/4.6 on.

@@ -46,8 +46,7 @@ pub fn flatten_with(
         let message = format!("`*bondspice {line}` is not understood");
         diagnostics.push(Diagnostic::warning("W0730", Span::NONE, message));
     }
-    usage::check(netlist, &header, diagnostics);
-    let mut flat = expand::expand_with(netlist, variation, diagnostics);
+    let mut flat = beside_usage(netlist, &header, variation, diagnostics);
     let (analyses, options) = experiment::settings(&flat, &header, &variation.options, diagnostics);
     let steps = analyses::steps(&flat, diagnostics);
     let picked = variation.analysis.as_deref();
@@ -90,6 +89,37 @@ pub fn flatten_with(
     };
     experiment::scales(&mut circuit, &header, diagnostics);
     (!has_errors(&diagnostics[before..])).then_some(circuit)
+}
+
+/// Above so many cards nodes that are named only once are looked for by a thread of its own.
+const LARGE: usize = 50_000;
+
+/// The expanded netlist, after what is said of nodes named only once.
+fn beside_usage<'n>(
+    netlist: &'n Netlist,
+    header: &Header,
+    variation: &'n Variation,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> expand::Flat<'n> {
+    let usage = || {
+        let mut said = vec![];
+        usage::check(netlist, header, &mut said);
+        said
+    };
+    if netlist.cards.len() < LARGE {
+        diagnostics.extend(usage());
+        return expand::expand_with(netlist, variation, diagnostics);
+    }
+    std::thread::scope(|scope| {
+        let beside = std::thread::Builder::new().spawn_scoped(scope, usage);
+        let mut found = vec![];
+        let flat = expand::expand_with(netlist, variation, &mut found);
+        // Where there is no thread to be had, one does both.
+        let said = beside.ok().and_then(|thread| thread.join().ok());
+        diagnostics.extend(said.unwrap_or_else(usage));
+        diagnostics.append(&mut found);
+        flat
+    })
 }
 
 #[cfg(test)]

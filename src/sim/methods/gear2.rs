@@ -8,7 +8,7 @@
 //! Steps grow by less than 1 + √2, within which the method is stable. After a corner one TR-BDF2 step is taken.
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.5.
 
-use super::trapezoidal::{led_away, second_difference};
+use super::trapezoidal::{SURE, led_away, second_difference};
 use super::{Work, filtered_error, trbdf2, weighted};
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
@@ -42,16 +42,18 @@ pub(crate) fn step(
     for (k, rate) in to.w.iter_mut().enumerate() {
         *rate = alpha * to.q[k] + beta[k];
     }
-    match missed {
-        Some(missed) => led_away(constant / (6.0 * missed + constant), x, &to.x, error),
-        None => {
-            for (k, sum) in sum.iter_mut().enumerate() {
-                let third = 2.0 * second_difference(h, last, history.w[k], from.w[k], to.w[k]);
-                *sum = h * h * h / 6.0 * constant * third;
-            }
-            filtered_error(network, alpha, sum, error);
-        }
-    }
     dense.hermite(history, from, to);
-    Ok(weighted(error, weights))
+    let away = missed.map_or(f64::INFINITY, |missed| {
+        led_away(constant / (6.0 * missed + constant), x, &to.x, error);
+        weighted(error, weights)
+    });
+    if away <= SURE {
+        return Ok(away);
+    }
+    for (k, sum) in sum.iter_mut().enumerate() {
+        let third = 2.0 * second_difference(h, last, history.w[k], from.w[k], to.w[k]);
+        *sum = h * h * h / 6.0 * constant * third;
+    }
+    filtered_error(network, alpha, sum, error);
+    Ok(weighted(error, weights).min(away))
 }

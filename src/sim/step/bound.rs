@@ -10,9 +10,9 @@ const SMALL: f64 = 0.05;
 const BOUND: u32 = 10;
 /// A step of the trapezoidal rule that errs by more than this part of its tolerance is as long as the error lets it be;
 const LARGE: f64 = 0.3;
-/// where that is less than this part of the limit, so many times, the other method comes back.
+/// where that is less than this part of the limit, so many times more often than not, the other method comes back.
 const SHORT: f64 = 0.5;
-const STRUGGLES: u32 = 3;
+const STRUGGLES: u32 = 20;
 /// Each time it comes back the limit must bind this many times as long.
 const PATIENCE: u32 = 4;
 
@@ -21,7 +21,7 @@ const PATIENCE: u32 = 4;
 pub(super) struct Bound {
     /// Steps, one after another, that the limit bound.
     bound: u32,
-    /// Steps of the trapezoidal rule that it did not.
+    /// Steps of the trapezoidal rule that it did not, less those that it did.
     struggles: u32,
     /// The method that was left for the trapezoidal rule.
     left: Option<Method>,
@@ -49,7 +49,11 @@ impl Run<'_> {
                 }
             }
             Some(other) if self.method == Method::Trapezoidal => {
-                bound.struggles += u32::from(error > LARGE && h < SHORT * limit);
+                if error > LARGE && h < SHORT * limit {
+                    bound.struggles += 1;
+                } else if h > 0.99 * limit {
+                    bound.struggles = bound.struggles.saturating_sub(1);
+                }
                 if bound.struggles >= STRUGGLES {
                     bound.left = None;
                     bound.returns += 1;

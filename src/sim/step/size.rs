@@ -1,0 +1,39 @@
+//! The size of the next step from the errors of the last ones.
+
+use super::Run;
+use crate::sim::methods::{self, Method};
+
+/// The part of the step that an error allows which is taken.
+const SAFETY: f64 = 0.9;
+/// A step becomes no smaller than this part of the last one without having failed.
+const LEAST: f64 = 0.2;
+/// Errors below this say nothing of how the solution changes.
+const NOTHING: f64 = 1e-2;
+
+/// The factor by which a step is shortened whose error was too large.
+pub(super) fn after_error(error: f64, power: f64) -> f64 {
+    (SAFETY * methods::growth(error, power)).clamp(0.1, 0.9)
+}
+
+impl Run<'_> {
+    /// The factor by which the next step is longer than this one, which had `error` in parts of its tolerance.
+    pub(super) fn factor(&mut self, error: f64, h: f64, failed: bool, power: f64) -> f64 {
+        // Gear's method is stable while steps grow by less than 1 + √2.
+        let most = if self.method == Method::Gear2 { 2.0 } else { 6.0 };
+        let size = error.max(1e-12);
+        let before = self.last.replace((size.max(NOTHING), h));
+        let most_allowed = if failed { 1.0 } else { most };
+        // Most steps under a limit err by next to nothing, and need no root to know it.
+        let longer = before.is_none_or(|(_, last)| h >= 0.7 * last);
+        if longer && size <= (SAFETY / most).powi(power as i32).min(NOTHING) {
+            return most_allowed;
+        }
+        let mut factor = SAFETY * methods::growth(size, power);
+        if let Some((last_error, last_h)) = before {
+            // Gustafsson's predictive controller: the error of the last step says how the solution changes.
+            let trend = h / last_h * methods::growth(size / last_error, power);
+            factor = factor.min(factor * trend.max(LEAST)).max(LEAST);
+        }
+        factor.clamp(LEAST, most_allowed)
+    }
+}
