@@ -4,6 +4,7 @@ pub mod syntax;
 pub mod elaborate;
 pub mod elements;
 pub mod graph;
+pub mod words;
 pub mod memory;
 pub mod causality;
 pub mod equations;

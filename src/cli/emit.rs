@@ -1,10 +1,8 @@
 //! `--emit STAGE`: each noun between the text and the result, as text, so that it can be looked at.
 
 use super::table::Table;
-use crate::bond::graph::{
-    self, BondGraph, Dissipation, Initial, Law, Memory, Modulus, Power, SignalLaw, Storage,
-    StoreInitial, StoreLaw, Variable,
-};
+use crate::bond::graph::BondGraph;
+use crate::bond::words::{expression as graph_expression, law, signal_law};
 use crate::circuit::stamps::{self, Stamps};
 use crate::circuit::{self, Circuit, DeviceKind, LawOf, Probe, Quantity, Waveform};
 use crate::expr::print::{number, print};
@@ -29,32 +27,9 @@ fn expression<L>(expr: &Expr<L>, leaf: &dyn Fn(&L) -> String) -> String {
     print(expr, Dialect::Bond, &mut |name| leaf(name))
 }
 
-/// An expression of the graph, elements and signals by name.
-pub fn graph_expression(graph: &BondGraph, expr: &graph::Expr) -> String {
-    expression(expr, &|leaf| match leaf {
-        graph::Leaf::Parameter(id) => graph.parameters[id.index()].name.clone(),
-        graph::Leaf::Signal(id) => graph.signals[id.index()].name.clone(),
-        graph::Leaf::Time => "time".into(),
-        graph::Leaf::Own(Variable::Power(power)) => letter(*power).into(),
-        graph::Leaf::Own(Variable::Stored) => "stored".into(),
-        graph::Leaf::Bond { bond, variable, negated } => {
-            let reading = format!("{}({})", letter(*variable), graph.bond_name(*bond));
-            if *negated { format!("(-{reading})") } else { reading }
-        }
-        graph::Leaf::Stored(end) => format!("stored({})", graph.port_name(*end)),
-    })
-}
-
-fn letter(power: Power) -> &'static str {
-    match power {
-        Power::Effort => "e",
-        Power::Flow => "f",
-    }
-}
-
 /// The flat graph.
 pub fn graph(graph: &BondGraph) -> String {
-    let text = |expr: &graph::Expr| graph_expression(graph, expr);
+    let text = |expr| graph_expression(graph, expr);
     let mut parameters = Table::new(&["parameter", "value", "given as"]);
     for parameter in &graph.parameters {
         parameters.row([parameter.name.clone(), number(parameter.value), text(&parameter.expr)]);
@@ -88,102 +63,6 @@ pub fn graph(graph: &BondGraph) -> String {
     let tables: Vec<String> =
         tables.iter().filter(|table| !table.is_empty()).map(Table::to_text).collect();
     format!("graph {}\n\n{}", graph.name, tables.join("\n"))
-}
-
-fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
-    let text = |expr: &graph::Expr| graph_expression(graph, expr);
-    let list = |name: &str, arguments: &[&graph::Expr]| {
-        let arguments: Vec<String> = arguments.iter().map(|a| text(a)).collect();
-        format!("{name}({})", arguments.join(", "))
-    };
-    match law {
-        SignalLaw::Algebraic(expr) => text(expr),
-        SignalLaw::Integrator { rate, initial } => {
-            format!("integ({}, {})", text(rate), initial_value(graph, initial))
-        }
-        SignalLaw::Memory { kind, input } => match kind {
-            Memory::Hysteresis { low, high } => {
-                format!("hysteresis({}, {}, {})", text(input), text(low), text(high))
-            }
-            Memory::Sample { period } => format!("sample({}, {})", text(input), text(period)),
-            Memory::Delay { by } => format!("delay({}, {})", text(input), text(by)),
-        },
-        SignalLaw::Waveform(waveform) => match waveform {
-            graph::Waveform::Noise { seed, rms, dt } => {
-                format!("noise({}, {}, {})", text(seed), text(rms), text(dt))
-            }
-            graph::Waveform::Step { at, before, after } => list("step", &[at, before, after]),
-            graph::Waveform::Ramp { at, slope } => list("ramp", &[at, slope]),
-            graph::Waveform::Pulse { low, high, delay, rise, fall, width, period } => {
-                list("pulse", &[low, high, delay, rise, fall, width, period])
-            }
-            graph::Waveform::Sine { offset, amplitude, frequency, delay, damping, phase } => {
-                list("sine", &[offset, amplitude, frequency, delay, damping, phase])
-            }
-            graph::Waveform::Pwl(points) => {
-                let points: Vec<String> =
-                    points.iter().map(|(t, y)| format!("{}, {}", text(t), text(y))).collect();
-                format!("pwl({})", points.join("; "))
-            }
-        },
-    }
-}
-
-fn initial_value(graph: &BondGraph, initial: &Initial) -> String {
-    match initial {
-        Initial::Given(expr) => graph_expression(graph, expr),
-        Initial::Implied => "implied".into(),
-    }
-}
-
-fn law(graph: &BondGraph, law: &Law) -> String {
-    let text = |expr: &graph::Expr| graph_expression(graph, expr);
-    let stored = |kind: &Storage| match kind {
-        Storage::Compliance => "q",
-        Storage::Inertia => "p",
-    };
-    match law {
-        Law::Zero => "common effort".into(),
-        Law::One => "common flow".into(),
-        Law::Source { detector: true, sets, .. } => format!("{} = 0, detector", letter(*sets)),
-        Law::Source { sets, value, .. } => format!("{} = {}", letter(*sets), text(value)),
-        Law::Dissipator(Dissipation::Linear(r)) => format!("e = ({})*f", text(r)),
-        Law::Dissipator(Dissipation::Effort(law)) => format!("e = {}", text(law)),
-        Law::Dissipator(Dissipation::Flow(law)) => format!("f = {}", text(law)),
-        Law::Store { kind, law, initial } => {
-            let (gives, stored) = (letter(kind.gives()), stored(kind));
-            let law = match law {
-                StoreLaw::Linear(c) => format!("{gives} = {stored}/({})", text(c)),
-                StoreLaw::OfStored(law) => format!("{gives} = {}", text(law)),
-                StoreLaw::OfPower(law) => format!("{stored} = {}", text(law)),
-            };
-            let initial = match initial {
-                StoreInitial::Stored(value) => format!(", {stored}0 = {}", text(value)),
-                StoreInitial::Power(value) => format!(", {gives}0 = {}", text(value)),
-                StoreInitial::Unstated => String::new(),
-            };
-            law + &initial
-        }
-        Law::Rate { kind, rate, initial } => {
-            let gives = letter(kind.gives());
-            format!("der({gives}) = {}, {gives}0 = {}", text(rate), initial_value(graph, initial))
-        }
-        Law::Field(field) => {
-            let ports = field.ports.iter().enumerate();
-            let ports =
-                ports.map(|(k, port)| format!("port {}: {}", k + 1, self::law(graph, port)));
-            ports.collect::<Vec<_>>().join("; ")
-        }
-        Law::Transformer(modulus) => format!("transformer, {}", self::modulus(graph, modulus)),
-        Law::Gyrator(modulus) => format!("gyrator, {}", self::modulus(graph, modulus)),
-    }
-}
-
-fn modulus(graph: &BondGraph, modulus: &Modulus) -> String {
-    match modulus {
-        Modulus::Ratio(ratio) => format!("ratio {}", graph_expression(graph, ratio)),
-        Modulus::Gain(gain) => format!("gain {}", graph_expression(graph, gain)),
-    }
 }
 
 /// The flat circuit.
