@@ -28,5 +28,7 @@ pub mod translate;
 pub mod sim;
 pub mod second;
 pub mod verify;
+pub mod draw;
+pub mod report;
 pub mod lsp;
 pub mod cli;

@@ -1,9 +1,11 @@
 //! `bondspice compare A B`: a trace against a reference. As `diff`: 0 same, 1 different, 2 trouble.
 
 use super::output::write_text;
+use super::plot;
 use super::session::{Exit, Session};
 use super::table::{Table, short};
 use crate::diagnostic::Diagnostic;
+use crate::draw::plot::{Source, compared};
 use crate::source::Span;
 use crate::trace::compare::{Comparison, Settings, compare};
 
@@ -13,7 +15,7 @@ pub const ABOUT: &str = "Compare a trace with a reference: 0 same, 1 different, 
 /// An example for the help.
 pub const EXAMPLE: &str = "The error of a signal is the largest |a - b| / (max - min of b) over the rows of the \
 reference b, the trace a interpolated there.\n\nExample: bondspice compare run.csv reference.csv --tolerance 1e-4 \
---signals 'x, I = f(armature)'";
+--signals 'x, I = f(armature)'\n         bondspice compare run.csv reference.csv --plot difference.svg";
 
 /// Its flags.
 #[derive(clap::Args)]
@@ -37,6 +39,9 @@ pub struct Arguments {
     /// Where to write the result
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
+    /// Plot both with the tube of the tolerance, and the errors: .svg or .tex
+    #[arg(long, value_name = "FILE")]
+    plot: Option<String>,
 }
 
 /// Compares.
@@ -58,7 +63,7 @@ fn compare_files(arguments: &Arguments, session: &mut Session) -> Result<Exit, E
     }
     let trace = session.load_trace(&arguments.trace)?;
     let reference = session.load_trace(&arguments.reference)?;
-    let signals = arguments.signals.as_deref().map(pairs);
+    let signals = arguments.signals.as_deref().map(names);
     let settings = Settings { tolerance: arguments.tolerance, rise: arguments.rise, signals };
     let comparison = compare(&trace, &reference, &settings);
     if comparison.signals.is_empty() {
@@ -69,6 +74,14 @@ fn compare_files(arguments: &Arguments, session: &mut Session) -> Result<Exit, E
             .because(format!("it has: {}", trace.names[1..].join(", ")))
             .help("pair names with --signals 'REFERENCE=TRACE, …'");
         return Err(session.fail(diagnostic));
+    }
+    if let Some(name) = &arguments.plot {
+        let form = plot::form(Some(name), session)?;
+        let (own, theirs) = (&arguments.trace, &arguments.reference);
+        let (own, theirs) =
+            (Source { name: own, trace: &trace }, Source { name: theirs, trace: &reference });
+        let panels = compared(own, theirs, &comparison, settings.signals.as_deref());
+        plot::show("", &panels, form, Some(name), session)?;
     }
     let text = if arguments.format == "json" {
         serde_json::to_string(&comparison).unwrap_or_default() + "\n"
@@ -107,7 +120,7 @@ pub fn table(comparison: &Comparison) -> String {
 }
 
 /// `x, I=f(armature)` as pairs; commas and equal signs within brackets belong to names.
-fn pairs(text: &str) -> Vec<(String, String)> {
+pub fn names(text: &str) -> Vec<(String, String)> {
     let split = |text: &str, at: char| -> Vec<String> {
         let mut parts = vec![String::new()];
         let mut depth = 0_i32;
@@ -138,6 +151,6 @@ mod tests {
     #[test]
     fn names_are_paired() {
         let pair = |a: &str, b: &str| (a.to_string(), b.to_string());
-        assert_eq!(pairs("x, v(a,b) = f(y) ,"), [pair("x", "x"), pair("v(a,b)", "f(y)")]);
+        assert_eq!(names("x, v(a,b) = f(y) ,"), [pair("x", "x"), pair("v(a,b)", "f(y)")]);
     }
 }

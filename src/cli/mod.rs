@@ -20,6 +20,9 @@ pub mod verify;
 pub mod compare;
 pub mod causality;
 pub mod trace;
+pub mod draw;
+pub mod plot;
+pub mod report;
 pub mod fmt;
 pub mod examples;
 pub mod completions;
@@ -72,6 +75,9 @@ pub const COMMANDS: &[Command] = &[
     command!(compare),
     command!(causality),
     command!(trace),
+    command!(draw),
+    command!(plot),
+    command!(report),
     command!(fmt),
     command!(examples),
     command!(completions),

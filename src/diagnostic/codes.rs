@@ -15,6 +15,7 @@
 //! | 0900-0919 | files | 5 |
 //! | 0920-0939 | data files: traces, maps, lists of times | 3 |
 //! | 0940-0999 | usage | 2 |
+//! | 10 | drawings, plots | 3 |
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug)]
@@ -275,6 +276,10 @@ pub const CODES: &[Code] = &[
     row("W0931", "result lacks variables of the map", "Some variables of the map need circuit variables that the simulator did not keep; they are left out. `.save all` keeps everything."),
     row("N0946", "one of several analyses is run", "A netlist asks for several analyses and the last is run. Pick another with --analysis."),
     row("N0947", "output interval chosen", "The file says how long to simulate and not how often to write a row: a thousand rows are written."),
+    // -- 10: drawings, plots
+    row("E1001", "too large to draw", "Nobody can read a picture of more than 160 junctions and elements. Draw instances as one node each with `--depth 0`, or write a `.dot` file, which Graphviz lays out at any size."),
+    row("E1010", "no such column", "A column that is to be plotted has no place in any of the traces. The message names the nearest, or all there are."),
+    row("N1001", "instances are not laid open", "The whole graph has too many junctions and elements for one picture, so that instances deeper than a level are drawn as one node each. `--depth` says how deep."),
 ];
 
 /// Stages: the first and the last number of its codes, what it is about, and the exit code of its errors.

@@ -18,6 +18,8 @@ const FLOORS: &[&str] = &[
     "sim",
     "second",
     "verify",
+    "draw",
+    "report",
     "lsp",
     "cli",
 ];

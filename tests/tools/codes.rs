@@ -22,7 +22,7 @@ fn codes(text: &str) -> impl Iterator<Item = &str> {
         let closed = text.get(at + 6..at + 7) == Some("\"");
         let digits = code.is_ascii()
             && code[1..].bytes().all(|byte| byte.is_ascii_digit())
-            && &code[1..2] == "0";
+            && ["0", "1"].contains(&&code[1..2]);
         (closed && digits && "EWN".contains(&code[..1])).then_some(code)
     })
 }

@@ -8,6 +8,7 @@ mod lsp;
 mod examples;
 mod docs;
 mod editors;
+mod drawings;
 mod gallery;
 mod codes;
 mod architecture;

@@ -1,0 +1,112 @@
+//! Small circuits with known schematics.
+
+use super::*;
+use crate::circuit::{Circuit, Device, DeviceKind, Node, NodeId, Parts, Waveform};
+use crate::source::Span;
+
+fn circuit(nodes: &[&str], devices: &[(&str, u32, u32, char)]) -> Circuit {
+    let node = |name: &&str| Node { name: name.to_string(), nominal: None, span: Span::NONE };
+    let device = |(name, a, b, kind): &(&str, u32, u32, char)| Device {
+        name: name.to_string(),
+        nodes: vec![NodeId(*a), NodeId(*b)],
+        kind: match kind {
+            'c' => DeviceKind::Capacitor { capacitance: 2.2e-5, initial: None },
+            'v' => DeviceKind::VoltageSource {
+                waveform: Waveform::Constant(5.0),
+                parts: Parts::default(),
+            },
+            _ => DeviceKind::Resistor { resistance: 4700.0 },
+        },
+        nominal: None,
+        span: Span::NONE,
+    };
+    Circuit {
+        nodes: nodes.iter().map(node).collect(),
+        devices: devices.iter().map(device).collect(),
+        ..Circuit::default()
+    }
+}
+
+fn lying(placed: &Placed) -> bool {
+    placed.ends.0.1 == placed.ends.1.1
+}
+
+#[test]
+fn a_ladder_is_drawn_as_one() {
+    let own = circuit(
+        &["0", "a", "b", "c"],
+        &[
+            ("v1", 1, 0, 'v'),
+            ("r1", 1, 2, 'r'),
+            ("c1", 2, 0, 'c'),
+            ("r2", 2, 3, 'r'),
+            ("c2", 3, 0, 'c'),
+        ],
+    );
+    let drawn = place(&own, &|_| true);
+    let lies: Vec<bool> = drawn.devices.iter().map(lying).collect();
+    assert_eq!(lies.iter().filter(|lies| **lies).count(), 2);
+    let x = |name: &str| drawn.devices.iter().find(|d| d.words.0 == name).unwrap().ends.0.0;
+    assert!(x("v1") < x("r1") && x("r1") < x("c1") && x("c1") < x("r2") && x("r2") < x("c2"));
+    assert_eq!(drawn.grounds.len(), 1);
+    let r1 = drawn.devices.iter().find(|d| d.words.0 == "r1").unwrap();
+    assert_eq!(r1.words.1, "4.7 k");
+}
+
+#[test]
+fn what_bridges_stands_in_a_layer_above() {
+    let own = circuit(
+        &["0", "a", "b", "c"],
+        &[
+            ("v1", 1, 0, 'v'),
+            ("r1", 1, 2, 'r'),
+            ("r2", 2, 3, 'r'),
+            ("r3", 1, 3, 'r'),
+            ("r4", 3, 0, 'r'),
+        ],
+    );
+    let drawn = place(&own, &|_| true);
+    let layers: Vec<f64> = drawn.devices.iter().filter(|d| lying(d)).map(|d| d.ends.0.1).collect();
+    assert_eq!(layers.len(), 3);
+    let top = layers.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(
+        layers.iter().filter(|y| **y == top).count(),
+        1,
+        "one of the mesh is above: {layers:?}"
+    );
+    // Its two risers lead down to the line.
+    let line = layers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let risers = drawn
+        .wires
+        .iter()
+        .filter(|(a, b)| a.0 == b.0 && a.1.min(b.1) == top && a.1.max(b.1) == line);
+    assert_eq!(risers.count(), 2);
+}
+
+#[test]
+fn what_ends_in_ground_hangs_below_its_node() {
+    let own = circuit(
+        &["0", "a", "b", "c"],
+        &[
+            ("v1", 1, 0, 'v'),
+            ("r1", 1, 2, 'r'),
+            ("c1", 2, 0, 'c'),
+            ("r2", 1, 3, 'r'),
+            ("c2", 3, 0, 'c'),
+        ],
+    );
+    let drawn = place(&own, &|_| true);
+    // The longest way is the line b-a-c; everything else stands upright.
+    assert_eq!(drawn.devices.iter().filter(|d| lying(d)).count(), 2);
+    let kept = place(&own, &|id| id.0 != 4);
+    assert_eq!((kept.devices.len(), kept.left_out), (4, 1));
+}
+
+#[test]
+fn numbers_are_short() {
+    for (value, text) in
+        [(0.0, "0"), (4700.0, "4.7 k"), (2.2e-5, "22 µ"), (-3.0, "−3"), (1e15, "1.000e15")]
+    {
+        assert_eq!(symbols::short(value), text);
+    }
+}
