@@ -57,6 +57,7 @@
         series: [{ label: data.time.label }, ...panel.columns.map((c, k) => ({ label: c.name + (c.unit ? ` [${c.unit}]` : ""), stroke: colours[k % 8], width: 1.3, points: { show: false }, value: (u, v) => v == null ? "" : v.toPrecision(6) }))],
         hooks: { setScale: [(u, key) => { if (key === "x" && !busy) show(u.scales.x.min, u.scales.x.max); }] },
       }, visible(panel, range[0], range[1], stripes()), place.children[p]);
+      chart.over.addEventListener("dblclick", () => show(whole[0], whole[1]));
       charts.push(chart);
     });
     show(range[0], range[1]);
@@ -64,9 +65,6 @@
   // All charts show one stretch of time, with as many points as it needs.
   const show = (low, high) => {
     if (low == null || high == null || !(high > low)) return;
-    // A double click asks for everything that the chart holds, which is what it shows: everything there is is meant.
-    const shown = charts[0] && charts[0].data[0];
-    if (shown && low <= shown[0] && high >= shown[shown.length - 1] && charts.some(c => c.scales.x.min !== low || c.scales.x.max !== high) === false && low !== whole[0]) { [low, high] = whole; }
     busy = true;
     charts.forEach((chart, p) => chart.batch(() => { chart.setData(visible(panels[p], low, high, stripes()), false); chart.setScale("x", { min: low, max: high }); chart.setScale("y", { min: null, max: null }); }));
     queueMicrotask(() => { busy = false; });

@@ -339,9 +339,8 @@ impl<'a> State<'a> {
         let count = self.at.len();
         let mut moved = vec![false; count];
         let mut waiting: Vec<usize> = vec![];
-        loop {
-            // Each part of a graph that does not hang together goes below those before it.
-            let Some(start) = (0..count).find(|k| !self.placed[*k]) else { break };
+        // Each part of a graph that does not hang together goes below those before it.
+        while let Some(start) = (0..count).find(|k| !self.placed[*k]) {
             let chain = self.chain(start);
             let down = (0..count)
                 .filter(|k| self.placed[*k])

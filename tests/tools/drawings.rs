@@ -3,6 +3,7 @@
 
 use bondspice::bond::causality;
 use bondspice::bond::elaborate::Overrides;
+use bondspice::circuit::{Circuit, NodeId};
 use bondspice::cli::draw::circuit_of;
 use bondspice::cli::pipeline;
 use bondspice::cli::session::{Global, Session};
@@ -13,6 +14,7 @@ use bondspice::draw::plot::{self, Axis, Curve, Panel};
 use bondspice::draw::{schematic, svg};
 use bondspice::source::{SourceMap, loader};
 use bondspice::trace::{Trace, formats};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 fn root() -> PathBuf {
@@ -133,6 +135,52 @@ fn bond_graphs_of_all_models_can_be_read_and_are_in_the_documentation() {
     assert!(stale.is_empty(), "not as drawn today (BONDSPICE_REWRITE=1 rewrites): {stale:?}");
 }
 
+/// Reads the circuit back from the drawing: what wires join must be the circuit's nodes, all of them and no others.
+fn wrong_connections(circuit: &Circuit, drawn: &schematic::Schematic) -> Vec<String> {
+    let mut points: Vec<(f64, f64)> = vec![];
+    let ends = drawn.devices.iter().flat_map(|d| [d.ends.0, d.ends.1]);
+    let wires = drawn.wires.iter().flat_map(|(a, b)| [*a, *b]);
+    for point in ends.chain(wires).chain(drawn.grounds.iter().copied()) {
+        if !points.contains(&point) {
+            points.push(point);
+        }
+    }
+    let mut set: Vec<usize> = (0..points.len()).collect();
+    for (a, b) in &drawn.wires {
+        // A wire joins every end that lies on it; wires that only cross are not joined.
+        let on = |p: &(f64, f64)| {
+            let along = (a.0.min(b.0)..=a.0.max(b.0)).contains(&p.0)
+                && (a.1.min(b.1)..=a.1.max(b.1)).contains(&p.1);
+            along && ((b.0 - a.0) * (p.1 - a.1) - (b.1 - a.1) * (p.0 - a.0)).abs() < 1e-6
+        };
+        let joined: Vec<usize> = (0..points.len()).filter(|k| on(&points[*k])).collect();
+        let names: Vec<usize> = joined.iter().map(|k| set[*k]).collect();
+        let to = names[0];
+        set.iter_mut().filter(|name| names.contains(name)).for_each(|name| *name = to);
+    }
+    let place = |p: &(f64, f64)| set[points.iter().position(|q| q == p).unwrap()];
+    let mut node_of: BTreeMap<usize, NodeId> = BTreeMap::new();
+    let mut found = vec![];
+    for ground in &drawn.grounds {
+        node_of.insert(place(ground), NodeId(0));
+    }
+    let mut parts: BTreeMap<NodeId, usize> = BTreeMap::new();
+    for device in &drawn.devices {
+        let own = &circuit.devices[device.device.0 as usize];
+        for (node, end) in own.nodes.iter().zip([device.ends.0, device.ends.1]) {
+            let part = place(&end);
+            if *node_of.entry(part).or_insert(*node) != *node {
+                found.push(format!("{} is joined to another node", own.name));
+            }
+            // Ground is drawn several times.
+            if node.0 != 0 && *parts.entry(*node).or_insert(part) != part {
+                found.push(format!("{} hangs loose", own.name));
+            }
+        }
+    }
+    found
+}
+
 #[test]
 fn circuits_of_all_models_can_be_read_and_are_in_the_documentation() {
     let (mut bad, mut stale) = (vec![], vec![]);
@@ -147,6 +195,9 @@ fn circuits_of_all_models_can_be_read_and_are_in_the_documentation() {
         }
         let placed = schematic::place(&circuit, &|id| kept[id.0 as usize]);
         let picture = schematic::paint(&placed);
+        bad.extend(
+            wrong_connections(&circuit, &placed).into_iter().map(|what| format!("{name}: {what}")),
+        );
         bad.extend(trouble(&picture).into_iter().map(|what| format!("{name}: {what}")));
         // Devices keep clear of each other, and no wire runs through one or through words.
         let words = picture.shapes.iter().filter_map(|shape| match shape {

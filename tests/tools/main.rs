@@ -9,6 +9,7 @@ mod examples;
 mod docs;
 mod editors;
 mod drawings;
+mod report;
 mod gallery;
 mod codes;
 mod architecture;

@@ -64,8 +64,8 @@ pub fn place(sketch: &Sketch) -> Placed {
         }
         most
     };
-    let (sides, ups): (fn(&Span) -> (i32, i32), fn(&Span) -> (i32, i32)) =
-        (|s| (s.left, s.right), |s| (s.top, s.bottom));
+    let sides = |span: &Span| (span.left, span.right);
+    let ups = |span: &Span| (span.top, span.bottom);
     let (left, right) = (pads(true, &sides, columns), pads(false, &sides, columns));
     let (top, bottom) = (pads(true, &ups, rows), pads(false, &ups, rows));
     let mut x = vec![0.0; columns];

@@ -123,11 +123,10 @@ fn columns(trace: &Trace, choice: &Choice) -> Vec<Column> {
     let mut found = vec![];
     for at in names {
         let name = &trace.names[at];
-        if let Some(base) = name.strip_suffix(".re") {
-            if let Some(column) = column(trace, base) {
-                found.push(column);
-                continue;
-            }
+        let base = name.strip_suffix(".re");
+        if let Some(column) = base.and_then(|base| column(trace, base)) {
+            found.push(column);
+            continue;
         }
         let real = name.strip_suffix(".im").map(|base| format!("{base}.re"));
         if real.is_none_or(|real| trace.position(&real).is_none()) {
@@ -148,11 +147,11 @@ fn column(trace: &Trace, name: &str) -> Option<Column> {
 }
 
 /// The panel of a key, made where there is none.
-fn panel_of<'p>(
-    panels: &'p mut Vec<(String, Panel)>,
+fn panel_of(
+    panels: &mut Vec<(String, Panel)>,
     key: String,
     make: impl FnOnce() -> Panel,
-) -> &'p mut Panel {
+) -> &mut Panel {
     let at = panels.iter().position(|(other, _)| *other == key).unwrap_or_else(|| {
         panels.push((key, make()));
         panels.len() - 1

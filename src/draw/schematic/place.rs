@@ -136,9 +136,14 @@ impl Drawn<'_> {
         let mut places: Vec<(f64, f64)> = vec![];
         let mut x: f64 = 0.0;
         let mut feet = vec![];
+        // Where what stands between two nodes ends.
+        let mut before: Option<f64> = None;
         for (k, (node, shunts)) in part.line.iter().enumerate() {
             let start = if shunts.is_empty() { x } else { x + 14.0 };
             let mut last = start;
+            if let Some(end) = before.take() {
+                self.wire((end, 0.0), (start, 0.0));
+            }
             for (s, shunt) in shunts.iter().enumerate() {
                 let left = if s == 0 { x } else { x + 22.0 };
                 let (axis, right) = self.shunt(shunt, *node, left, 0.0, bottom, &mut feet);
@@ -167,6 +172,7 @@ impl Drawn<'_> {
                 if let Some(device) = direct.first() {
                     self.wire((last, 0.0), (from, 0.0));
                     self.device(*device, *node, (from, 0.0), (x, 0.0));
+                    before = Some(x);
                 }
             }
         }
