@@ -148,7 +148,7 @@ pub fn power_devices(model: &pipeline::Model, circuit: &Circuit) -> Vec<bool> {
         .map(|name| names.text(*name).to_lowercase())
         .collect();
     let carries = |node: &NodeId| {
-        let name = circuit.nodes.get(node.0 as usize).map_or("", |node| node.name.as_str());
+        let name = circuit.nodes.get(node.0 as usize).map_or("", |node| &*node.name);
         node.0 == 0 || power.contains(&name.to_lowercase())
     };
     circuit.devices.iter().map(|device| device.nodes.iter().all(carries)).collect()

@@ -100,7 +100,7 @@ struct Drawn<'a> {
 
 impl Drawn<'_> {
     fn name(&self, node: NodeId) -> &str {
-        self.circuit.nodes.get(node.0 as usize).map_or("", |node| node.name.as_str())
+        self.circuit.nodes.get(node.0 as usize).map_or("", |node| &*node.name)
     }
 
     fn words(&self, device: DeviceId) -> (String, String) {

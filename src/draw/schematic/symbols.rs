@@ -50,8 +50,8 @@ pub fn symbol(device: &Device) -> Symbol {
 
 /// The value of a device in a few letters; empty where its law is long.
 pub fn value(circuit: &Circuit, device: &Device) -> String {
-    let node = |id: NodeId| circuit.nodes.get(id.0 as usize).map_or("?", |node| node.name.as_str());
-    let name = |id: DeviceId| circuit.devices.get(id.0 as usize).map_or("?", |d| d.name.as_str());
+    let node = |id: NodeId| circuit.nodes.get(id.0 as usize).map_or("?", |node| &*node.name);
+    let name = |id: DeviceId| circuit.devices.get(id.0 as usize).map_or("?", |d| &*d.name);
     let voltage = |[a, b]: [NodeId; 2]| match b.0 {
         0 => format!("v({})", node(a)),
         _ => format!("v({},{})", node(a), node(b)),

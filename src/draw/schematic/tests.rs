@@ -5,10 +5,10 @@ use crate::circuit::{Circuit, Device, DeviceKind, Node, NodeId, Parts, Waveform}
 use crate::source::Span;
 
 fn circuit(nodes: &[&str], devices: &[(&str, u32, u32, char)]) -> Circuit {
-    let node = |name: &&str| Node { name: name.to_string(), nominal: None, span: Span::NONE };
+    let node = |name: &&str| Node { name: (*name).into(), nominal: None, span: Span::NONE };
     let device = |(name, a, b, kind): &(&str, u32, u32, char)| Device {
-        name: name.to_string(),
-        nodes: vec![NodeId(*a), NodeId(*b)],
+        name: (*name).into(),
+        nodes: [NodeId(*a), NodeId(*b)][..].into(),
         kind: match kind {
             'c' => DeviceKind::Capacitor { capacitance: 2.2e-5, initial: None },
             'v' => DeviceKind::VoltageSource {
