@@ -41,7 +41,7 @@ fn elements_stand_around_their_junction() {
 
 #[test]
 fn names_are_escaped_in_every_form() {
-    let (_, _, picture, dot) = drawn("Se:U_1(10 V) -> R:R_2(e = if(f < 1 A, 2 Ohm*f, 3 Ohm*f))\n");
+    let (_, _, picture, dot) = drawn("Se:U_1(10 V) -> R:R_2(e = 2 Ohm*f*(f < 1 A))\n");
     let (svg, tikz) = (svg::write(&picture), tikz::write(&picture));
     assert!(svg.contains("&lt;") && !svg.contains("f < 1"), "{svg}");
     assert!(tikz.contains("R: R\\_2"), "{tikz}");

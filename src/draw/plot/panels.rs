@@ -67,7 +67,11 @@ fn panel(
     let alike: Vec<&Panel> =
         all.iter().filter(|p| p.x.label == panel.x.label && p.x.scale == panel.x.scale).collect();
     let mut across = Ruler::new(&panel.x, of(|p| p.0, &alike).into_iter(), 9, !panel.equal);
-    let mut up = Ruler::new(&panel.y, of(|p| p.1, &[panel]).into_iter(), 5, false);
+    // Where a part of the abscissa is asked for, what lies outside of it takes no room.
+    let (low, high_end) = panel.x.limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let inside = of(|p| p.0, &[panel]).into_iter().zip(of(|p| p.1, &[panel]));
+    let seen = inside.filter(|(x, _)| (low..=high_end).contains(x)).map(|(_, y)| y);
+    let mut up = Ruler::new(&panel.y, seen, 5, false);
     if panel.equal {
         (across, up) = equal(panel, &across, &up, wide / high);
     }

@@ -18,7 +18,9 @@ const DOTS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x8
 fn panel(panel: &Panel, wide: usize, high: usize) -> String {
     let points = || panel.curves.iter().flat_map(|curve| curve.points.iter());
     let across = Ruler::new(&panel.x, points().map(|p| p.0), 5, true);
-    let up = Ruler::new(&panel.y, points().map(|p| p.1), high / 2, false);
+    let (low, last) = panel.x.limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let seen = points().filter(|p| (low..=last).contains(&p.0)).map(|p| p.1);
+    let up = Ruler::new(&panel.y, seen, high / 2, false);
     let margin =
         up.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(1).max(4) + 1;
     let columns = wide - margin - 1;

@@ -101,6 +101,24 @@ fn a_million_points_are_drawn_by_what_can_be_seen_of_them() {
 }
 
 #[test]
+fn a_part_of_the_abscissa_fills_the_panel() {
+    let time: Vec<f64> = (0..100).map(f64::from).collect();
+    let own = trace(&["time", "x"], &["s", "m"], vec![time.clone(), time]);
+    let choice = Choice { limits: Some((10.0, 20.0)), ..Choice::default() };
+    let found = panels(&[Source { name: "run", trace: &own }], &choice).unwrap();
+    let picture = paint("", &found);
+    let texts: Vec<&str> = picture
+        .shapes
+        .iter()
+        .filter_map(|shape| match shape {
+            Shape::Words { words, .. } => Some(words.text.as_str()),
+            _ => None,
+        })
+        .collect();
+    assert!(texts.contains(&"20") && !texts.contains(&"40"), "{texts:?}");
+}
+
+#[test]
 fn text_for_a_terminal_shows_the_curve() {
     let time: Vec<f64> = (0..100).map(f64::from).collect();
     let own = trace(&["time", "x"], &["s", "m"], vec![time.clone(), time]);

@@ -37,12 +37,16 @@ pub fn write(schematic: &Schematic) -> String {
             Symbol::Block => "generic",
         };
         // Labels stand to the left of the way along: the way to the right, or upward, puts them above, to the left.
-        let side = if b.0 > a.0 || b.1 > a.1 { ("l", "l_") } else { ("l_", "l") };
+        let side = if b.0 > a.0 || b.1 > a.1 { "l" } else { "l_" };
         let upright = (b.0 - a.0).abs() < 1.0;
-        let words = if upright {
-            format!("{}={{{name} {value}}}", side.0)
-        } else {
-            format!("{}={{{name}}}, a{}={{{value}}}", side.0, if side.0 == "l" { "_" } else { "^" })
+        let words = match (upright, value.is_empty()) {
+            // Beside a device that stands, its value below its name.
+            (true, false) => format!("{side}={{\\shortstack[l]{{{name}\\\\{value}}}}}"),
+            (true, true) => format!("{side}={{{name}}}"),
+            (false, _) => {
+                let other = if side == "l" { "a_" } else { "a" };
+                format!("{side}={{{name}}}, {other}={{{value}}}")
+            }
         };
         out += &format!("\\draw {} to[{kind}, {words}] {};\n", at(a), at(b));
     }
