@@ -239,6 +239,9 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "W0931" "map_in_part.expected"
     "N0946" "last_analysis.cir"
     "N0947" "step_chosen.bg"
+    "E1001" "too_large_to_draw.bg"
+    "E1010" "column_to_plot.expected"
+    "N1001" "instances_closed.bg"
 };
 
 macro_rules! beside {
