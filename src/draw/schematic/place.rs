@@ -14,7 +14,7 @@ const LAYER: f64 = 54.0;
 const GAP: f64 = 34.0;
 /// The size of the letters at devices and at nodes.
 pub const SIZES: (f64, f64) = (10.5, 9.5);
-/// The width at which a row of parts ends.
+/// The least width at which a row of parts ends.
 const PAGE: f64 = 1500.0;
 
 /// A device between two points, its first node at the first.
@@ -55,10 +55,16 @@ pub fn place(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Schematic {
     let drawn = |k: usize| keep(DeviceId(k as u32));
     all.left_out = (0..circuit.devices.len()).filter(|k| !drawn(*k)).count();
     let (mut left, mut top, mut lowest) = (0.0, 0.0, 0.0_f64);
+    let mut parts = vec![];
     for part in plan(circuit, keep) {
         let mut drawn = Drawn { circuit, schematic: Schematic::default() };
-        let (width, above, below) = drawn.part(&part);
-        if left > 0.0 && left + width > PAGE {
+        let room = drawn.part(&part);
+        parts.push((drawn, room));
+    }
+    // A row is as wide as a page, or as the widest part.
+    let page = parts.iter().map(|(_, room)| room.0).fold(PAGE, f64::max);
+    for (mut drawn, (width, above, below)) in parts {
+        if left > 0.0 && left + width > page {
             (left, top) = (0.0, lowest + GAP);
         }
         drawn.schematic.shift(left, top + above);
