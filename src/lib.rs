@@ -28,6 +28,7 @@ pub mod translate;
 pub mod sim;
 pub mod second;
 pub mod verify;
+pub mod analysis;
 pub mod draw;
 pub mod report;
 pub mod lsp;

@@ -467,6 +467,8 @@ pub struct Regulator {
     pub bandwidth: Option<f64>,
     /// The phase margin wanted, rad.
     pub margin: Option<f64>,
+    /// Kp and Ki of a `pi`, as they are given.
+    pub gains: Option<[Expr; 2]>,
     /// Where it stands.
     pub span: Span,
 }

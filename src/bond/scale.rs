@@ -118,6 +118,9 @@ pub fn scale(graph: &mut BondGraph, scales: &[(Domain, f64)]) {
     for regulator in &mut graph.regulators {
         regulator.controlled = of.read(&regulator.controlled, None);
         regulator.reference = of.read(&regulator.reference, None);
+        for gain in regulator.gains.iter_mut().flatten() {
+            *gain = of.read(gain, None);
+        }
     }
 }
 

@@ -19,6 +19,13 @@ pub mod simulate;
 pub mod verify;
 pub mod compare;
 pub mod causality;
+pub mod linear;
+pub mod linearize;
+pub mod poles;
+pub mod bode;
+pub mod tf;
+pub mod paths;
+pub mod tune;
 pub mod trace;
 pub mod draw;
 pub mod plot;
@@ -74,6 +81,12 @@ pub const COMMANDS: &[Command] = &[
     command!(verify),
     command!(compare),
     command!(causality),
+    command!(linearize),
+    command!(poles),
+    command!(bode),
+    command!(tf),
+    command!(paths),
+    command!(tune),
     command!(trace),
     command!(draw),
     command!(plot),

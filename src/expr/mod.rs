@@ -15,6 +15,7 @@ pub mod dag;
 mod derivative;
 pub mod slope;
 pub mod program;
+pub mod polynomial;
 pub mod print;
 #[cfg(test)]
 mod tests;

@@ -54,6 +54,8 @@ pub struct Run {
     pub statistics: Statistics,
     /// The corners within the run, seconds.
     pub corners: Vec<f64>,
+    /// All unknowns of the equations at the end.
+    pub end: Vec<f64>,
 }
 
 /// Integrates from 0 to the last of `times`, which ascend.
@@ -168,6 +170,7 @@ pub fn integrate(
     }
     run.energy = energy::balance(graph, &prepared.equations, &meter, &start, &end);
     run.energy.junctions = meter.worst(graph);
+    run.end = end;
     Some(run)
 }
 

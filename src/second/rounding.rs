@@ -105,7 +105,8 @@ impl Rounding {
             Node::Leaf(Input::Unknown(k)) => self.unknowns[*k as usize],
             Node::Leaf(Input::Wave(k)) => self.waves[*k as usize],
             Node::Leaf(Input::Time) => (self.until, 0.0),
-            Node::Leaf(Input::Condition(_)) => (1.0, 0.0),
+            // The second route's equations hold numbers.
+            Node::Leaf(Input::Condition(_) | Input::Parameter(_)) => (1.0, 0.0),
             Node::Unary(Unary::Negate, a) => self.of(a),
             Node::Unary(Unary::Not, _) => (1.0, 0.0),
             Node::Binary(op, a, b) => {

@@ -27,6 +27,7 @@ pub const EXAMPLES: &[(&str, &str)] = examples! {
     "eha_components.bg"
     "eha_two_line.bg"
     "eha_lever.bg"
+    "eha_fig13.bg"
     "drive_train.bg"
     "step_down.bg"
     "reversing_drive.bg"

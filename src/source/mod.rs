@@ -38,10 +38,11 @@ impl Span {
 
     /// The smallest span that holds both.
     pub fn join(self, other: Span) -> Span {
-        if self.is_none() || self.file != other.file {
-            return if self.is_none() { other } else { self };
+        // What stands on the command line has places, too, and no file.
+        if self == Span::NONE || (self.is_none() && !other.is_none()) {
+            return other;
         }
-        if other.is_none() {
+        if other == Span::NONE || self.file != other.file {
             return self;
         }
         Span { file: self.file, start: self.start.min(other.start), end: self.end.max(other.end) }

@@ -16,5 +16,8 @@ mod events;
 mod signals;
 mod lines;
 mod rows;
+mod linear;
+mod symbolic;
+mod paths;
 mod second_route;
 mod ngspice;

@@ -18,6 +18,7 @@ const FLOORS: &[&str] = &[
     "sim",
     "second",
     "verify",
+    "analysis",
     "draw",
     "report",
     "lsp",

@@ -43,7 +43,7 @@ mod unused_tests;
 
 pub use expand::MOST_PARTS;
 pub use experiment::require_drives;
-pub use observe::observables;
+pub use observe::{observables, unit_of};
 pub use program::{Program, load};
 pub use reading::READINGS;
 

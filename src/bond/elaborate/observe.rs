@@ -336,7 +336,7 @@ fn stored_column(graph: &BondGraph, end: End) -> Option<Observation> {
 }
 
 /// The SI unit of a reading or a signal alone, in its domain's words; empty when it is not known.
-fn unit_of(graph: &BondGraph, expr: &Expr) -> String {
+pub fn unit_of(graph: &BondGraph, expr: &Expr) -> String {
     match &*expr.node {
         Node::Leaf(Leaf::Signal(id)) => {
             let unit = &graph.signals[id.index()].unit;

@@ -37,6 +37,7 @@ impl Scope<'_> {
         {
             d.push(self.no_regulator(&written.signal, "its law is another one"));
         }
+        let gains = signal.and_then(|id| self.gains(id));
         let controlled = self.lower(&written.controlled, Place::observed(), d);
         let reference = self.lower(&written.reference, Place::observed(), d);
         let mut positive = |value: &Option<syntax::Expr>, what: &'static str| {
@@ -58,8 +59,38 @@ impl Scope<'_> {
             reference: reference?,
             bandwidth,
             margin,
+            gains,
             span,
         })
+    }
+
+    /// Kp and Ki of a signal that is made with `pi`, as they are written there.
+    fn gains(&mut self, id: SignalId) -> Option<[Expr; 2]> {
+        let Some(Some(Valued { value, here, .. })) = self.signals.get(id.index()) else {
+            return None;
+        };
+        let here = *here;
+        let Node::Leaf(syntax::Leaf::Call(call)) = &*value.node else { return None };
+        let [arguments] = &call.rows[..] else { return None };
+        let given = |name: &str, position: usize| {
+            let named = arguments.iter().find(|argument| {
+                argument.label.as_ref().is_some_and(|label| label.name.text == name)
+            });
+            let placed = arguments.get(position).filter(|argument| argument.label.is_none());
+            match &named.or(placed)?.value {
+                syntax::Value::Expr(expr) => Some(expr.clone()),
+                _ => None,
+            }
+        };
+        if call.name.text != "pi" {
+            return None;
+        }
+        let (kp, ki) = (given("Kp", 1)?, given("Ki", 2)?);
+        // What is wrong with them has been said of the signal.
+        let mut said = vec![];
+        let mut lower =
+            |expr| self.at(here, |scope| scope.lower(expr, Place::observed(), &mut said));
+        Some([lower(&kp)?, lower(&ki)?])
     }
 
     /// Whether a signal is made with `pi` or `pid`.

@@ -332,6 +332,7 @@ impl Scope<'_> {
             regulator.signal = place[regulator.signal.index()];
             renumber(&mut regulator.controlled);
             renumber(&mut regulator.reference);
+            regulator.gains.iter_mut().flatten().for_each(&mut renumber);
         }
         for signal in &mut graph.signals {
             match &mut signal.law {

@@ -108,7 +108,7 @@ pub fn compile(equations: &Equations, pins: &[(usize, usize)]) -> Compiled {
 }
 
 /// Room for all inputs, conditions free.
-fn inputs(equations: &Equations) -> Vec<f64> {
+pub(super) fn inputs(equations: &Equations) -> Vec<f64> {
     let mut inputs = vec![0.0; equations.unknowns.len() + 1 + equations.waves.len()];
     inputs.extend(equations.conditions.iter().flat_map(|_| [f64::NAN, 0.0]));
     inputs
@@ -119,7 +119,7 @@ fn inputs(equations: &Equations) -> Vec<f64> {
 /// A condition is two inputs: the value that it is held at (NaN: it is evaluated as it stands) and, where that is not
 /// 0, the slope of a ramp in its place. On a ramp a truth lies between 0 and 1: `if` blends its branches, `and` takes
 /// the smaller and `or` the larger.
-struct Lowering<'a> {
+pub(super) struct Lowering<'a> {
     dag: &'a mut Dag,
     n: usize,
     waves: usize,
@@ -128,7 +128,7 @@ struct Lowering<'a> {
 }
 
 impl<'a> Lowering<'a> {
-    fn new(dag: &'a mut Dag, equations: &'a Equations) -> Lowering<'a> {
+    pub(super) fn new(dag: &'a mut Dag, equations: &'a Equations) -> Lowering<'a> {
         Lowering {
             dag,
             n: equations.unknowns.len(),
@@ -138,7 +138,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn add(&mut self, formula: &Formula) -> NodeId {
+    pub(super) fn add(&mut self, formula: &Formula) -> NodeId {
         self.lower(formula).0
     }
 
@@ -158,6 +158,10 @@ impl<'a> Lowering<'a> {
             Node::Leaf(Input::Unknown(k)) => self.dag.input(*k),
             Node::Leaf(Input::Time) => self.dag.input(self.n as u32),
             Node::Leaf(Input::Wave(k)) => self.dag.input(self.n as u32 + 1 + k),
+            Node::Leaf(Input::Parameter(k)) => {
+                let first = self.n + 1 + self.waves + 2 * self.conditions.len();
+                self.dag.input(first as u32 + k)
+            }
             Node::Unary(op, a) => {
                 let (a, truth) = self.lower(a);
                 if *op == Unary::Not && truth {

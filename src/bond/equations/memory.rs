@@ -191,7 +191,7 @@ impl Past {
                 Input::Unknown(k) => unknowns.iter().position(|u| u == k),
                 Input::Time => Some(unknowns.len()),
                 // What is delayed is a signal: its conditions are in its own equation.
-                Input::Condition(_) => None,
+                Input::Condition(_) | Input::Parameter(_) => None,
                 Input::Wave(k) => {
                     used.iter().position(|u| u == k).map(|at| unknowns.len() + 1 + at)
                 }

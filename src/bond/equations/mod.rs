@@ -12,6 +12,7 @@
 pub mod known;
 pub mod compiled;
 pub mod memory;
+pub mod slopes;
 pub mod waveform;
 
 use super::graph::{
@@ -61,6 +62,8 @@ pub enum Input {
     Wave(u32),
     /// The value of a condition that follows from the unknowns, by its index in [`Equations::conditions`].
     Condition(u32),
+    /// A parameter of the graph, where equations keep their names.
+    Parameter(u32),
 }
 
 /// An equation's right-hand side or residual.
@@ -111,6 +114,8 @@ pub struct Equations {
     pub conditions: Vec<Condition>,
     /// Memories, by the round in which they take their values.
     pub memories: Vec<Remembered>,
+    /// Whether parameters stand by their names; else they are numbers.
+    named: bool,
     /// First index of the bonds' efforts; flows alternate with them.
     first_bond: usize,
     /// By signal: its unknown or its wave.
@@ -126,7 +131,17 @@ const MOST_ECHOES: usize = 20_000;
 
 /// The equations of a graph, from the definitions of its elements.
 pub fn equations(graph: &BondGraph) -> Equations {
+    written(graph, false)
+}
+
+/// The same equations with parameters by their names, for what is to be said in the words of the model.
+pub fn named_equations(graph: &BondGraph) -> Equations {
+    written(graph, true)
+}
+
+fn written(graph: &BondGraph, named: bool) -> Equations {
     let mut all = Equations {
+        named,
         signals: vec![None; graph.signals.len()],
         stored: vec![None; graph.vertices.len()],
         rated: vec![None; graph.vertices.len()],
@@ -496,6 +511,7 @@ impl Equations {
         };
         let stored = |end: End| self.stored(end).map_or(Formula::number(f64::NAN), |k| self.at(k));
         match leaf {
+            Leaf::Parameter(id) if self.named => Formula::leaf(Input::Parameter(id.0)),
             Leaf::Parameter(id) => Formula::number(graph.parameters[id.index()].value),
             Leaf::Signal(id) => self.leaf(self.signals[id.index()]),
             Leaf::Time => Formula::leaf(Input::Time),
@@ -523,7 +539,10 @@ impl Equations {
         if !jumps || !over_time_alone(expr) {
             return None;
         }
-        let formula = expr.map(&mut |leaf, _| self.lower_leaf(graph, leaf, None));
+        let formula = expr.map(&mut |leaf, _| match leaf {
+            Leaf::Parameter(id) => Formula::number(graph.parameters[id.index()].value),
+            leaf => self.lower_leaf(graph, leaf, None),
+        });
         self.waves.push(Known::Held(formula));
         Some(Formula::leaf(Input::Wave(self.waves.len() as u32 - 1)))
     }

@@ -25,7 +25,8 @@ struct Rough {
 }
 
 /// Makes one of those that belong together, and orders them by size.
-pub fn gather(pencil: &mut Pencil, roots: Vec<Complex>) -> Vec<Root> {
+pub fn gather(pencil: &mut Pencil, mut roots: Vec<Complex>) -> Vec<Root> {
+    mirror(&mut roots);
     let mut rough: Vec<Rough> = roots.into_iter().map(|at| Rough::of(pencil, at)).collect();
     // Beyond all that G says: at infinity but for rounding.
     rough.retain(|root| root.by_storage < 0.1 * size(root.at) || root.at == Complex::ZERO);
@@ -55,6 +56,31 @@ pub fn gather(pencil: &mut Pencil, roots: Vec<Complex>) -> Vec<Root> {
     }
     pair(&mut found);
     found
+}
+
+/// Makes roots of the lower half the mirrors of those of the upper one, so that both fall into the same groups.
+fn mirror(roots: &mut [Complex]) {
+    let half = |sign: f64| {
+        let own = (0..roots.len()).filter(|k| roots[*k].im * sign > 0.0);
+        own.collect::<Vec<_>>()
+    };
+    let (upper, mut lower) = (half(1.0), half(-1.0));
+    if upper.len() != lower.len() {
+        return;
+    }
+    for k in upper {
+        let mirrored = Complex::new(roots[k].re, -roots[k].im);
+        let near = |a: &usize, b: &usize| {
+            size(roots[*a] - mirrored).total_cmp(&size(roots[*b] - mirrored))
+        };
+        let Some(nearest) = (0..lower.len()).min_by(|a, b| near(&lower[*a], &lower[*b])) else {
+            return;
+        };
+        // Imaginary parts that are rounding have nothing to do with each other.
+        if size(roots[lower[nearest]] - mirrored) < 0.1 * mirrored.im.abs() {
+            roots[lower.swap_remove(nearest)] = mirrored;
+        }
+    }
 }
 
 /// Indices of roots that belong together.

@@ -1,0 +1,193 @@
+//! What the commands of linear analysis share: the point, the variables, the linear model.
+
+use super::flags::ModelFlags;
+use super::pipeline;
+use super::session::{Exit, Session};
+use crate::analysis::linear::{self, Linear};
+use crate::analysis::point::{self, At};
+use crate::analysis::symbolic::symbols::name_values;
+use crate::analysis::tune::{self, Tuned};
+use crate::bond::causality::Causality;
+use crate::bond::elaborate::Overrides;
+use crate::bond::graph::{BondGraph, Observation};
+use crate::diagnostic::{Diagnostic, has_errors};
+use crate::quantity::Unit;
+use crate::source::{FileId, Span};
+
+/// Flags of every command that linearises.
+#[derive(Clone, Debug, clap::Args)]
+pub struct PointFlags {
+    /// The bond graph (.bg); - for standard input
+    pub file: String,
+    #[command(flatten)]
+    /// What to change in it.
+    pub model: ModelFlags,
+    /// Where to linearise: start, rest (where all comes to rest, sources held as at the start), or a time of the run: 1.2s
+    #[arg(long, value_name = "POINT", default_value = "start")]
+    pub at: String,
+}
+
+/// A model with its linear one.
+pub struct Linearised {
+    /// The graph.
+    pub graph: BondGraph,
+    /// Its causality.
+    pub causality: Causality,
+    /// Its linear equations.
+    pub linear: Linear,
+}
+
+/// Reads, elaborates and linearises a model. `inputs` and `outputs` are lists of variables; without them the model's own.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn linearise(
+    flags: &PointFlags,
+    inputs: Option<&str>,
+    outputs: Option<&str>,
+    session: &mut Session,
+) -> Result<Linearised, Exit> {
+    prepare(flags, inputs, outputs, false, session)
+}
+
+/// The same of the model with names for the values that are written at its elements.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn linearise_named(
+    flags: &PointFlags,
+    inputs: Option<&str>,
+    outputs: Option<&str>,
+    session: &mut Session,
+) -> Result<Linearised, Exit> {
+    prepare(flags, inputs, outputs, true, session)
+}
+
+fn prepare(
+    flags: &PointFlags,
+    inputs: Option<&str>,
+    outputs: Option<&str>,
+    named: bool,
+    session: &mut Session,
+) -> Result<Linearised, Exit> {
+    let at = at(&flags.at, session)?;
+    let mut overrides = flags.model.overrides(session)?;
+    let file = session.load(&flags.file)?;
+    pipeline::require_bond(session, file, "linearised")?;
+    let inputs = inputs.map(|list| variables(session, file, &overrides, list)).transpose()?;
+    if let Some(list) = outputs {
+        overrides.observe = Some(list.to_string());
+    }
+    let mut d = vec![];
+    let found = find(session, file, &overrides, (at, named), inputs.as_deref(), &mut d);
+    session.say(d);
+    match (found, session.exit()) {
+        (Some(found), Exit::Fine) => Ok(found),
+        (_, exit) => Err(exit),
+    }
+}
+
+/// Designs the regulators of a model, and tells what laws were left out.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn tuned(flags: &PointFlags, session: &mut Session) -> Result<(Vec<Tuned>, Vec<String>), Exit> {
+    let at = at(&flags.at, session)?;
+    let overrides = flags.model.overrides(session)?;
+    let file = session.load(&flags.file)?;
+    pipeline::require_bond(session, file, "tuned")?;
+    let mut d = vec![];
+    let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
+    let found = graph.and_then(|graph| {
+        let causality = pipeline::causality(&graph, &mut d)?;
+        tune::tune(&graph, &causality, at, &mut d)
+    });
+    d.retain(|said| !UNHEARD.contains(&said.code));
+    session.say(d);
+    match (found, session.exit()) {
+        (Some(found), Exit::Fine) => Ok(found),
+        (_, exit) => Err(exit),
+    }
+}
+
+/// What is said of a run says nothing of a linear model.
+const UNHEARD: &[&str] = &["W0201", "W0402"];
+
+fn find(
+    session: &mut Session,
+    file: FileId,
+    overrides: &Overrides,
+    (at, named): (At, bool),
+    inputs: Option<&[Observation]>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Linearised> {
+    let mut graph = pipeline::graph(&mut session.map, file, overrides, d)?;
+    if named {
+        graph = name_values(&graph);
+    }
+    let causality = pipeline::causality(&graph, d)?;
+    let point = point::find(&graph, &causality, at, d)?;
+    let linear = linear::linearise(&graph, &causality, &point, inputs, d)?;
+    d.retain(|said| !UNHEARD.contains(&said.code));
+    (!has_errors(d)).then_some(Linearised { graph, causality, linear })
+}
+
+/// A list of variables of a model.
+fn variables(
+    session: &mut Session,
+    file: FileId,
+    overrides: &Overrides,
+    list: &str,
+) -> Result<Vec<Observation>, Exit> {
+    let overrides = Overrides { observe: Some(list.to_string()), ..overrides.clone() };
+    let mut d = vec![];
+    let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
+    if graph.is_some() {
+        // The rest is said once, with the outputs.
+        return Ok(graph.map(|graph| graph.experiment.observe).unwrap_or_default());
+    }
+    session.say(d);
+    Err(session.exit())
+}
+
+/// `start`, `rest` or a time.
+fn at(text: &str, session: &mut Session) -> Result<At, Exit> {
+    match text {
+        "start" => Ok(At::Start),
+        "rest" | "op" => Ok(At::Rest),
+        _ => quantity(text, "s", "--at takes start, rest or a time, as in 1.2s", session)
+            .map(At::Time),
+    }
+}
+
+/// A number that is not negative with a unit like `unit`, or without one, in SI. Angular frequencies become frequencies.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn quantity(text: &str, unit: &str, takes: &str, session: &mut Session) -> Result<f64, Exit> {
+    let digits = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-');
+    let mut end = text.find(|c| !digits(c)).unwrap_or(text.len());
+    if text[end..].starts_with(['e', 'E']) {
+        let more = text[end + 1..].find(|c| !digits(c)).map_or(text.len(), |at| end + 1 + at);
+        end = if more > end + 1 { more } else { end };
+    }
+    let own = text[end..].trim();
+    let number = text[..end].parse::<f64>().ok();
+    let wanted = Unit::parse(unit).ok();
+    let read = match own {
+        "" => number,
+        own => Unit::parse(own)
+            .ok()
+            .filter(|own| wanted.as_ref().is_some_and(|wanted| wanted.dimension == own.dimension))
+            .zip(number)
+            .map(|(own, number)| own.to_si(number)),
+    };
+    let turns = if unit == "Hz" && own.contains("rad") { std::f64::consts::TAU } else { 1.0 };
+    match read.filter(|value| value.is_finite() && *value >= 0.0) {
+        Some(value) => Ok(value / turns),
+        None => {
+            let message = format!("{takes}, not `{text}`");
+            Err(session.fail(Diagnostic::error("E0940", Span::NONE, message)))
+        }
+    }
+}
