@@ -13,6 +13,7 @@ use super::linear::{Entry, Linear, linearise};
 use super::point::{At, find};
 use super::poles::poles;
 use super::response::Resolvent;
+use super::symbolic::symbols::bond_variable;
 use crate::bond::causality::Causality;
 use crate::bond::elaborate::unit_of;
 use crate::bond::equations::slopes::Stands;
@@ -345,14 +346,7 @@ fn spoken(graph: &BondGraph, expr: &Expr) -> String {
         Leaf::Signal(id) => of(id),
         Leaf::Parameter(id) => graph.parameters[id.index()].name.clone(),
         Leaf::Bond { bond, variable, negated } => {
-            let letter = if *variable == Power::Effort { "e" } else { "f" };
-            let ends =
-                [graph.bond(*bond).from, graph.bond(*bond).to].map(|end| graph.vertex(end.vertex));
-            let shares = if *variable == Power::Effort { "0" } else { "1" };
-            let junction = ends.iter().find(|vertex| vertex.kind == shares);
-            let one_port = ends.iter().find(|vertex| vertex.bonds.len() == 1);
-            let name = junction.or(one_port).map_or(graph.bond_name(*bond), |v| v.name.clone());
-            format!("{}{letter}({name})", if *negated { "-" } else { "" })
+            format!("{}{}", if *negated { "-" } else { "" }, bond_variable(graph, *bond, *variable))
         }
         Leaf::Stored(end) => format!("q({})", graph.port_name(*end)),
         Leaf::Time => "time".into(),

@@ -8,7 +8,8 @@ use crate::analysis::linear::Linear;
 use crate::bond::equations::slopes::Stands;
 use crate::bond::equations::{Input, Unknown};
 use crate::bond::graph::{
-    BondGraph, Dissipation, Expr, Law, Leaf, Modulus, Parameter, ParameterId, StoreLaw,
+    BondGraph, BondId, Dissipation, Expr, Law, Leaf, Modulus, Parameter, ParameterId, Power,
+    StoreLaw,
 };
 use crate::expr::dag::Op;
 use crate::expr::polynomial::{Polynomial, TooLarge, VARIABLES};
@@ -73,7 +74,11 @@ pub fn name_values(graph: &BondGraph) -> BondGraph {
             _ => continue,
         };
         let Some(number) = value.as_number().filter(|number| *number != 0.0) else { continue };
-        let name = if taken.contains(&name) { format!("{name}_{kind}") } else { name };
+        let mut own = name.clone();
+        while taken.contains(&own) {
+            own = format!("{own}_{kind}");
+        }
+        let name = own;
         let id = ParameterId(parameters.len() as u32);
         parameters.push(Parameter {
             name,
@@ -333,6 +338,8 @@ impl<'m> Reader<'m> {
         value: f64,
         node: NodeId,
     ) -> Result<Ratio, Trouble> {
+        // A parameter may be called as Laplace's variable is.
+        let name = if name == "s" { "s_".to_string() } else { name };
         let known = self.symbols.iter().position(|symbol| symbol.name == name);
         let k = match known {
             Some(k) => k,
@@ -354,8 +361,12 @@ impl<'m> Reader<'m> {
             return Ok(Ratio::number(0.0));
         }
         let text = self.text(node, 0).filter(|text| text.len() <= 60);
-        let count = self.symbols.iter().filter(|symbol| symbol.name.starts_with("k_")).count();
-        let name = format!("k_{}", count + 1);
+        let taken = |name: &String| {
+            self.symbols.iter().any(|symbol| symbol.name == *name)
+                || self.graph.parameters.iter().any(|parameter| parameter.name == *name)
+        };
+        let mut free = (1..).map(|k| format!("k_{k}")).skip_while(taken);
+        let name = free.next().unwrap_or_default();
         let known = self.symbols.iter().find(|symbol| symbol.node == Some(node));
         let name = known.map_or(name, |symbol| symbol.name.clone());
         let meaning = text.unwrap_or_else(|| "a slope at the point".into());
@@ -402,20 +413,26 @@ impl<'m> Reader<'m> {
     }
 }
 
-/// The name of an unknown: a bond's variable by the junction that shares it, or by the element whose own it is.
+/// The name of an unknown, a bond's variable as [`bond_variable`] has it.
 pub fn short_name(graph: &BondGraph, linear: &Linear, k: usize) -> String {
-    let (letter, bond, shares) = match linear.kinds[k] {
-        Unknown::Effort(bond) => ("e", bond, "0"),
-        Unknown::Flow(bond) => ("f", bond, "1"),
-        _ => return linear.unknowns[k].name.clone(),
+    match linear.kinds[k] {
+        Unknown::Effort(bond) => bond_variable(graph, bond, Power::Effort),
+        Unknown::Flow(bond) => bond_variable(graph, bond, Power::Flow),
+        _ => linear.unknowns[k].name.clone(),
+    }
+}
+
+/// A bond's variable by the junction that shares it, or by the element whose own it is.
+pub fn bond_variable(graph: &BondGraph, bond: BondId, variable: Power) -> String {
+    let (letter, shares) = match variable {
+        Power::Effort => ("e", "0"),
+        Power::Flow => ("f", "1"),
     };
     let ends = [graph.bond(bond).from, graph.bond(bond).to].map(|end| graph.vertex(end.vertex));
     let junction = ends.iter().find(|vertex| vertex.kind == shares);
-    let one_port = || ends.iter().find(|vertex| vertex.bonds.len() == 1);
-    match junction.or_else(one_port) {
-        Some(vertex) => format!("{letter}({})", vertex.name),
-        None => linear.unknowns[k].name.clone(),
-    }
+    let one_port = ends.iter().find(|vertex| vertex.bonds.len() == 1);
+    let name = junction.or(one_port).map_or(graph.bond_name(bond), |vertex| vertex.name.clone());
+    format!("{letter}({name})")
 }
 
 /// The monomial of s.
