@@ -166,15 +166,12 @@ fn one(
         ));
         return None;
     };
-    let mut theta = wrapped(-PI + margin - libm::atan2(here.im, here.re));
-    let mut sign = 1.0;
-    // A plant of negative gain wants negative gains.
-    if theta.abs() > 0.5 * PI {
-        theta = wrapped(theta + PI);
-        sign = -1.0;
-    }
+    // A plant of negative gain wants negative gains; at low frequencies it leads by more than any lag makes up for.
+    let low = p(1e-3 * omega).map_or(0.0, |p| libm::atan2(p.im, p.re));
+    let sign = if low > 0.25 * PI { -1.0 } else { 1.0 };
+    let mut theta = wrapped(-PI + margin - libm::atan2(sign * here.im, sign * here.re));
     if theta > 1e-9 {
-        let most = (margin - theta.abs()).to_degrees();
+        let most = (margin - theta).to_degrees();
         let message = format!(
             "a PI regulator cannot give `{name}` this margin: the plant leaves {most:.1} deg"
         );
