@@ -5,6 +5,7 @@
 pub mod waveform;
 pub mod sweep;
 pub mod devices;
+mod slots;
 pub mod stamper;
 pub mod stamps;
 

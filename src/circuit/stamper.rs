@@ -1,16 +1,14 @@
 //! Gives every node and branch its unknown, and lets devices write their terms in terms of nodes and devices.
 
 use super::devices::{self, Branch, Needs};
+use super::slots::{Index, Slots, readings};
 use super::stamps::{
     Charge, DeviceLabel, Law, LawStamp, Leaf, Mode, SourceStamp, Stamps, Terms, Unknown, UnknownId,
     watched_name,
 };
-use super::{
-    Circuit, Device, DeviceId, DeviceKind, Expr, NodeId, Part, Parts, Probe, Quantity, Waveform,
-    called,
-};
+use super::{Circuit, Device, DeviceId, Expr, NodeId, Part, Parts, Probe, Waveform, called};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{self, Binary, Function, slope::slope};
+use crate::expr::{Binary, Function, slope::slope};
 use smallvec::smallvec;
 use std::sync::Arc;
 
@@ -22,44 +20,6 @@ pub struct Stamper<'a> {
     pub stamps: Stamps,
     diagnostics: &'a mut Vec<Diagnostic>,
     slots: Vec<Slots>,
-}
-
-/// An index that there may be; half as large as an `Option`, since a million devices have seven each.
-#[derive(Clone, Copy)]
-struct Index(u32);
-
-impl Index {
-    const NONE: Index = Index(u32::MAX);
-
-    fn get(self) -> Option<u32> {
-        (self.0 != u32::MAX).then_some(self.0)
-    }
-
-    fn unknown(self) -> Option<UnknownId> {
-        self.get().map(UnknownId)
-    }
-}
-
-/// What belongs to one device alone.
-#[derive(Clone, Copy)]
-struct Slots {
-    branch: Index,
-    second: Index,
-    hidden: [Index; 2],
-    internal: Index,
-    charge: Index,
-    mode: Index,
-}
-
-impl Slots {
-    const NONE: Slots = Slots {
-        branch: Index::NONE,
-        second: Index::NONE,
-        hidden: [Index::NONE; 2],
-        internal: Index::NONE,
-        charge: Index::NONE,
-        mode: Index::NONE,
-    };
 }
 
 /// The current of a device in terms of the unknowns.
@@ -493,41 +453,4 @@ pub fn voltage(across: [Option<UnknownId>; 2]) -> Law {
         [Some(a), Some(b)] => unknown(a).binary(Binary::Subtract, unknown(b)),
         [None, None] => Law::number(0.0),
     }
-}
-
-/// Which devices' currents are read by other devices, and which by outputs.
-fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
-    fn mark(expr: &expr::Expr<super::Leaf>, marks: &mut [bool]) {
-        expr.leaves(&mut |leaf, _| {
-            if let super::Leaf::Current(id) | super::Leaf::Part(_, Probe::Current(id)) = leaf {
-                marks[id.0 as usize] = true;
-            }
-        });
-    }
-    let mut read = vec![false; circuit.devices.len()];
-    let mut observed = read.clone();
-    for device in &circuit.devices {
-        match &device.kind {
-            DeviceKind::Cccs { control, .. } | DeviceKind::Ccvs { control, .. } => {
-                read[control.0 as usize] = true
-            }
-            DeviceKind::BehaviouralVoltage { law }
-            | DeviceKind::BehaviouralCurrent { law }
-            | DeviceKind::BehaviouralResistor { law }
-            | DeviceKind::BehaviouralCapacitor { law, .. }
-            | DeviceKind::BehaviouralInductor { law, .. }
-            | DeviceKind::Quantity(
-                Quantity::Derivative { law }
-                | Quantity::Integral { law, .. }
-                | Quantity::Delay { law, .. },
-            ) => mark(law, &mut read),
-            DeviceKind::Switch { control, .. }
-            | DeviceKind::CrossedSwitch { control, .. }
-            | DeviceKind::SmoothSwitch { control, .. } => mark(control, &mut read),
-            _ => {}
-        }
-    }
-    circuit.outputs.iter().for_each(|output| mark(&output.expr, &mut observed));
-    circuit.watched.iter().for_each(|expr| mark(expr, &mut observed));
-    (read, observed)
 }
