@@ -302,6 +302,7 @@ pub const STAGES: &[(u32, u32, &str, u8)] = &[
     (900, 919, "files", 5),
     (920, 939, "data files", 3),
     (940, 999, "usage", 2),
+    (1000, 1099, "drawings and plots", 3),
 ];
 
 /// What the stage of a code is about.

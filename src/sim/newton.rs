@@ -114,7 +114,7 @@ pub(crate) fn solve_stage(
 ) -> Result<(), Cut> {
     let n = x.len();
     let linear = network.system.is_linear();
-    if !linear && near::solve(network, stage, x, q, scratch) {
+    if !linear && stage.unconfirmed > 0.0 && near::solve(network, stage, x, q, scratch) {
         return Ok(());
     }
     let mut before = f64::INFINITY;

@@ -211,9 +211,10 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
-        // Whether columns are straight is read off the step's own polynomials, where it has those of all unknowns; only
-        // what is written is solved for. Parabolas through stages say little of junctions.
-        let smooth = !index2 && !work.dense.by_unknowns && !network.system.output_rates;
+        // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
+        // only what is written is solved for. Within the long steps of methods of higher order what follows a source
+        // moves in ways that their polynomials do not say.
+        let smooth = !index2 && work.dense.by_past && !network.system.output_rates;
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;

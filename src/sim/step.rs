@@ -442,7 +442,9 @@ impl<'a> Run<'a> {
         self.fresh = false;
         self.end_detour();
         self.suit_limit(error, h);
-        self.work.unconfirmed = UNCONFIRMED * error.max(NEGLIGIBLE);
+        // Of index 2 currents are rates of what is solved for, and take all that iterations leave.
+        let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };
+        self.work.unconfirmed = left;
         let factor = self.factor(error, h, failed, power);
         // A step that was clipped says little against the size that had been planned.
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };

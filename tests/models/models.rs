@@ -137,6 +137,29 @@ fn series_circuit() {
     }
 }
 
+/// The motor of Fig. 13 runs without load: its speed at a step of the voltage, in rpm, and its current.
+#[test]
+fn the_simplified_actuator() {
+    let (l, j, r, f, phi, u, start) = (1.7e-3, 1.3e-3, 0.46, 3e-3, 0.23, 60.0, 10e-3);
+    let square = (r * f + phi * phi) / (l * j);
+    let a = 0.5 * (r / l + f / j);
+    let w = f64::sqrt(square - a * a);
+    let last = u * phi / (r * f + phi * phi);
+    let swing = move |t: f64| (-a * t).exp() * (w * t).sin() / w;
+    let speed = move |t: f64| {
+        let t = (t - start).max(0.0);
+        last * (1.0 - (-a * t).exp() * (w * t).cos() - a * swing(t))
+    };
+    let rpm = |t: f64| speed(t) * 30.0 / std::f64::consts::PI;
+    // J·ω' + f·ω = Φ·i
+    let current = |t: f64| (j * last * square * swing((t - start).max(0.0)) + f * speed(t)) / phi;
+    for (reltol, tolerance) in [(None, 1e-4), (Some("1e-8"), 1e-6)] {
+        let forms: [(&str, &dyn Fn(f64) -> f64); 2] =
+            [("f(shaft)", &rpm), ("f(armature)", &current)];
+        closed_form("eha_fig13", &options(reltol), tolerance, &forms);
+    }
+}
+
 /// Values that other tools' tests and documentation print, or that follow from closed forms.
 /// Model, parameters set, and (time, column, digits).
 type Printed = (

@@ -112,6 +112,8 @@ pub(crate) struct Dense {
     /// Whether charges between are those of the unknowns between, rather than polynomials of their own: a junction that
     /// leaves its conduction has lost almost all of its charge, and the rest says where its voltage is.
     pub by_unknowns: bool,
+    /// Whether unknowns between lie on parabolas through the point before: as exact as steps of second order are.
+    pub by_past: bool,
 }
 
 impl Dense {
@@ -120,12 +122,13 @@ impl Dense {
             x: std::array::from_fn(|_| vec![0.0; n]),
             q: std::array::from_fn(|_| vec![0.0; charges]),
             by_unknowns: false,
+            by_past: false,
         }
     }
 
     /// Parabolas of the unknowns through their values at a part of the step; charges follow from them.
     pub fn parabolas(&mut self, theta: f64, from: &State, middle: &[f64], to: &State) {
-        self.by_unknowns = true;
+        (self.by_unknowns, self.by_past) = (true, false);
         let [first, second, third] = &mut self.x;
         for (i, k) in first.iter_mut().enumerate() {
             let line = (1.0 - theta) * from.x[i] + theta * to.x[i];
@@ -138,7 +141,7 @@ impl Dense {
     /// Cubic polynomials of the charges through their values and rates at both ends; parabolas of the unknowns through the
     /// point before.
     pub fn hermite(&mut self, history: &History, from: &State, to: &State) {
-        self.by_unknowns = false;
+        (self.by_unknowns, self.by_past) = (false, true);
         let h = to.t - from.t;
         for k in 0..from.q.len() {
             let change = to.q[k] - from.q[k];

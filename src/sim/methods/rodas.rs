@@ -176,7 +176,7 @@ pub(crate) fn step(
         return Err(Cut::NonFinite { device: network.non_finite_law() });
     }
     if size <= 1.0 {
-        dense.by_unknowns = false;
+        (dense.by_unknowns, dense.by_past) = (false, false);
         for (k, row) in tableau.dense.iter().enumerate() {
             dense.x[k].fill(0.0);
             dense.q[k].fill(0.0);
