@@ -13,7 +13,7 @@ pub type Table<V> = FxHashMap<Name, V>;
 
 /// Nodes or devices by names: at the top, where a big netlist has most of its names, at their numbers, elsewhere hashed.
 pub enum Numbers {
-    /// The number of each name; [`Numbers::NONE`] where it has none.
+    /// The number of each name; `u32::MAX` where it has none.
     Dense(Vec<u32>),
     /// By name.
     Sparse(Table<u32>),
