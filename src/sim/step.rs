@@ -441,7 +441,6 @@ impl<'a> Run<'a> {
         self.network.statistics.accepted += 1;
         self.fresh = false;
         self.end_detour();
-        self.suit_limit(error, h);
         // Of index 2 currents are rates of what is solved for, and take all that iterations leave.
         let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };
         self.work.unconfirmed = left;
@@ -470,6 +469,7 @@ impl<'a> Run<'a> {
         self.network.memories.forget(self.state.t);
         self.weigh();
         self.row_here()?;
+        self.suit_limit(error, h);
         let report = self.rows.is_some() && self.network.statistics.accepted.is_multiple_of(64);
         if let Some(progress) = self.settings.progress.as_ref().filter(|_| report) {
             progress(self.state.t / self.settings.stop);

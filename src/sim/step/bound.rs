@@ -3,6 +3,7 @@
 
 use super::Run;
 use crate::sim::methods::{Method, SMOOTH};
+use crate::sim::op;
 
 /// A step that the limit binds errs by less than this part of its tolerance,
 const SMALL: f64 = 0.05;
@@ -42,7 +43,10 @@ impl Run<'_> {
             None if matches!(self.method, Method::Rodas4 | Method::Rodas5p) => {
                 let binds = error < SMALL && h > 0.99 * limit;
                 bound.bound = if binds { bound.bound + 1 } else { 0 };
-                if bound.bound >= BOUND * PATIENCE.saturating_pow(bound.returns) {
+                if bound.bound >= BOUND * PATIENCE.saturating_pow(bound.returns)
+                    && self.find_rates()
+                {
+                    let bound = &mut self.bound;
                     bound.left = Some(self.method);
                     (bound.bound, bound.struggles) = (0, 0);
                     self.go_on_with(Method::Trapezoidal, "the step limit binds");
@@ -62,6 +66,22 @@ impl Run<'_> {
             }
             _ => {}
         }
+    }
+
+    /// Finds the rates of the charges, which Rosenbrock methods do without. Says whether they were found.
+    fn find_rates(&mut self) -> bool {
+        let Run { network, state, floors, work, .. } = self;
+        let kept = state.clone();
+        let mut slides = vec![];
+        let found = op::consistent_values(network, state, floors, &mut slides, &mut work.scratch);
+        let found = found.is_ok() && slides.is_empty();
+        state.x.copy_from_slice(&kept.x);
+        if !found {
+            state.copy_from(&kept);
+        }
+        work.history.forget();
+        work.linearised = false;
+        found
     }
 
     fn go_on_with(&mut self, method: Method, reason: &str) {
