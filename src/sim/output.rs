@@ -14,6 +14,10 @@ use std::io;
 /// How often a step is halved for straight lines at most.
 const MOST_HALVED: u32 = 8;
 
+/// No line is asked to be straighter than this part of a column's range, however small `reltol` is: rows would be many
+/// for what nobody sees.
+const STRAIGHTEST: f64 = 1e-6;
+
 /// Columns that are measured are straight between rows within this part of what others are.
 const MEASURED: f64 = 0.1;
 
@@ -342,12 +346,13 @@ impl<'a> Rows<'a> {
         // Columns that are written at times of their own need not be straight between steps.
         let first = if self.has_times() { measured } else { 0 };
         for c in first..self.low.len() {
-            let reltol = if c < measured { self.reltol } else { MEASURED * self.reltol };
+            let part =
+                if c < measured { self.reltol.max(STRAIGHTEST) } else { MEASURED * self.reltol };
             let (a, b) = (left[c + 1], right[c + 1]);
             let off = (self.row[c + 1] - (a + theta * (b - a))).abs();
             let (low, high) = (self.low[c], self.high[c]);
             let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
-            most = most.max(off / (reltol * (high - low)).max(rounding));
+            most = most.max(off / (part * (high - low)).max(rounding));
         }
         most
     }

@@ -4,12 +4,14 @@ mod bound;
 mod crossing;
 pub(super) mod past;
 mod restart;
+mod rounding;
 mod rows;
 mod size;
 mod trouble;
 
 use self::bound::Bound;
 use self::crossing::{Crossed, Located, Search};
+use self::rounding::Rounding;
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
 use super::events::Controls;
@@ -150,6 +152,7 @@ struct Run<'a> {
     absolute: Vec<f64>,
     largest: Vec<f64>,
     weights: Vec<f64>,
+    rounding: Rounding,
     /// Unknowns of index 2.
     untested: Vec<bool>,
     /// Rates of index 2, and the largest of each so far.
@@ -197,13 +200,6 @@ impl<'a> Run<'a> {
         let network = Network::new(system, 0.0, settings.stop);
         let (n, charges) = (system.equations(), system.charges());
         let rows = sink.map(|sink| Rows::new(&network, settings, sink));
-        // Below the rounding of the largest voltage or current an unknown that is really 0 is noise.
-        let noise = |voltage: bool| {
-            let of_kind = system.unknowns.iter().zip(magnitudes.unwrap_or(&[]));
-            let of_kind = of_kind.filter(|(unknown, _)| unknown.voltage == voltage);
-            64.0 * f64::EPSILON * of_kind.fold(0.0f64, |most, (_, size)| most.max(*size))
-        };
-        let noises = [noise(false), noise(true)];
         let absolute = system.unknowns.iter().enumerate().map(|(k, unknown)| {
             let literal = if unknown.voltage { settings.vntol } else { settings.abstol };
             match (settings.tolerance, unknown.nominal, magnitudes.map(|m| m[k])) {
@@ -212,8 +208,7 @@ impl<'a> Run<'a> {
                     settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
                 }
                 (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
-                    let noise = noises[usize::from(unknown.voltage)].min(literal);
-                    literal.min(1e-3 * settings.reltol * size).max(noise)
+                    literal.min(1e-3 * settings.reltol * size)
                 }
                 _ => literal,
             }
@@ -225,6 +220,7 @@ impl<'a> Run<'a> {
             absolute: absolute.collect(),
             largest: vec![0.0; n],
             weights: vec![0.0; n],
+            rounding: Rounding::new(n),
             untested: vec![false; n],
             untested_rates: vec![false; charges],
             largest_rates: vec![0.0; charges],
@@ -341,8 +337,9 @@ impl<'a> Run<'a> {
                     continue;
                 }
                 Ok(error) => {
-                    self.network.statistics.rejected.error += 1;
+                                self.network.statistics.rejected.error += 1;
                     cuts.note(h, Reason::Error(self.worst_error(), error));
+                    self.see_rounding(error);
                     h *= size::after_error(error, power);
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
@@ -440,6 +437,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), Failure> {
         self.network.statistics.accepted += 1;
         self.fresh = false;
+        self.see_rounding(error);
         self.end_detour();
         // Of index 2 currents are rates of what is solved for, and take all that iterations leave.
         let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };

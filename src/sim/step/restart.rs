@@ -88,6 +88,7 @@ impl Run<'_> {
     /// Consistent values for the charges of `state`.
     pub(super) fn restart(&mut self, moment: Moment) -> Result<(), Failure> {
         self.work.history.forget();
+        self.rounding.forget();
         self.work.scratch.forget_bend();
         self.work.unconfirmed = 0.0;
         self.work.linearised = false;
@@ -278,7 +279,8 @@ impl Run<'_> {
             self.weights[k] = if self.untested[k] {
                 f64::INFINITY
             } else {
-                (part * (reltol * self.largest[k] + self.absolute[k])).max(f64::MIN_POSITIVE)
+                let weight = part * (reltol * self.largest[k] + self.absolute[k]);
+                weight.max(self.rounding.floor(k)).max(f64::MIN_POSITIVE)
             };
         }
         if !self.index2 && !self.was_index2 {
