@@ -1,5 +1,5 @@
 //! What linear theory says of a model: matrices, poles and zeros, frequency responses, transfer functions in its own
-//! parameters, causal paths and loops, gains of regulators.
+//! parameters, causal paths and loops, gains of regulators; and sweeps over parameters.
 //!
 //! ```text
 //! E·y' = A·y + B·u        w = C·y + D·u        y: states, efforts, flows, signals of the bond graph
@@ -19,3 +19,4 @@ pub mod symbolic;
 pub mod paths;
 pub mod resonance;
 pub mod tune;
+pub mod sweep;

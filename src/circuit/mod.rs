@@ -130,12 +130,12 @@ pub enum DeviceKind {
         coupling: f64,
     },
     VoltageSource {
-        waveform: Waveform,
-        parts: Parts,
+        waveform: Box<Waveform>,
+        parts: Box<Parts>,
     },
     CurrentSource {
-        waveform: Waveform,
-        parts: Parts,
+        waveform: Box<Waveform>,
+        parts: Box<Parts>,
     },
     /// v = gain·(v(c+) − v(c−)).
     Vcvs {
@@ -183,7 +183,7 @@ pub enum DeviceKind {
     },
     /// Two-state switch with hysteresis, by a voltage or a current.
     Switch {
-        control: Expr,
+        control: Box<Expr>,
         on: f64,
         off: f64,
         on_resistance: f64,
@@ -192,7 +192,7 @@ pub enum DeviceKind {
     },
     /// Switch whose two states within the band of its thresholds are turned round (a negative hysteresis).
     CrossedSwitch {
-        control: Expr,
+        control: Box<Expr>,
         above: f64,
         below: f64,
         on_resistance: f64,
@@ -200,18 +200,7 @@ pub enum DeviceKind {
         initially_on: Option<bool>,
     },
     /// Switch whose resistance goes over smoothly.
-    SmoothSwitch {
-        control: Expr,
-        /// Where it is wholly on, wholly off.
-        on: f64,
-        off: f64,
-        /// Where it begins to turn off when on, to turn on when off; without them at `on` and at `off`.
-        holds_on: Option<f64>,
-        holds_off: Option<f64>,
-        on_resistance: f64,
-        off_resistance: f64,
-        initially_on: Option<bool>,
-    },
+    SmoothSwitch(Box<SmoothSwitch>),
     /// A value that laws speak of and that no tree of theirs can say; its current is that value.
     Quantity(Quantity),
     /// Lossless transmission line between two ports.
@@ -219,7 +208,7 @@ pub enum DeviceKind {
         impedance: f64,
         delay: f64,
         /// v1, i1, v2, i2 until the first delay is over.
-        initial: Option<[f64; 4]>,
+        initial: Option<Box<[f64; 4]>>,
     },
     /// The voltage of the second node as it was at the last multiple of the period, at the first node.
     Hold {
@@ -229,8 +218,32 @@ pub enum DeviceKind {
     /// Junction diode.
     Diode {
         model: Box<DiodeModel>,
-        instance: DiodeInstance,
+        instance: Box<DiodeInstance>,
     },
+}
+
+// A circuit of a million devices is a gigabyte or not by these: what is large and rare stands in a box.
+const _: () = assert!(size_of::<DeviceKind>() <= 48 && size_of::<Device>() <= 120);
+
+/// A switch whose resistance goes over smoothly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothSwitch {
+    /// What it goes by.
+    pub control: Expr,
+    /// Where it is wholly on.
+    pub on: f64,
+    /// Where it is wholly off.
+    pub off: f64,
+    /// Where it begins to turn off when on; without it at `on`.
+    pub holds_on: Option<f64>,
+    /// Where it begins to turn on when off; without it at `off`.
+    pub holds_off: Option<f64>,
+    /// In Ω.
+    pub on_resistance: f64,
+    /// In Ω.
+    pub off_resistance: f64,
+    /// Whether it is on at the start; without it its control says so.
+    pub initially_on: Option<bool>,
 }
 
 /// What the law of a behavioural capacitor or inductor gives.
@@ -253,7 +266,7 @@ pub enum Quantity {
     /// A law as it was a time ago.
     Delay { law: Expr, by: f64 },
     /// A function of time with corners.
-    Signal { waveform: Waveform },
+    Signal { waveform: Box<Waveform> },
 }
 
 /// What an independent source is outside a run over time.

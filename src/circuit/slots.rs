@@ -68,9 +68,10 @@ pub(super) fn readings(circuit: &Circuit) -> (Vec<bool>, Vec<bool>) {
                 | Quantity::Integral { law, .. }
                 | Quantity::Delay { law, .. },
             ) => mark(law, &mut read),
-            DeviceKind::Switch { control, .. }
-            | DeviceKind::CrossedSwitch { control, .. }
-            | DeviceKind::SmoothSwitch { control, .. } => mark(control, &mut read),
+            DeviceKind::Switch { control, .. } | DeviceKind::CrossedSwitch { control, .. } => {
+                mark(control, &mut read)
+            }
+            DeviceKind::SmoothSwitch(switch) => mark(&switch.control, &mut read),
             _ => {}
         }
     }

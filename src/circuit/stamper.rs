@@ -160,7 +160,7 @@ impl<'a> Stamper<'a> {
         }
         for (k, needs) in needs.iter().enumerate().filter(|(_, needs)| needs.hidden > 0) {
             let (id, device) = (DeviceId(k as u32), &circuit.devices[k]);
-            for slot in slots[k].hidden.iter_mut().take(needs.hidden) {
+            for slot in slots[k].hidden.iter_mut().take(needs.hidden.into()) {
                 *slot = Index(stamps.unknowns.len() as u32);
                 stamps.unknowns.push(Unknown {
                     name: format!("u({})", device.name.to_lowercase()).into(),

@@ -154,15 +154,19 @@ pub fn set_times(circuit: &mut Circuit, overrides: &Overrides, d: &mut Vec<Diagn
     }
 }
 
-/// A time as a netlist writes it, `20ms` or `20 ms`.
-fn time(text: &str, flag: &str, d: &mut Vec<Diagnostic>) -> Option<f64> {
+/// A number as a netlist writes it, `20ms` or `20 ms`.
+pub fn number(text: &str, flag: &str, d: &mut Vec<Diagnostic>) -> Option<f64> {
     let packed = text.replace(' ', "");
-    let read = cards(&format!(".param time_={packed}"), flag, Default::default(), d)?;
-    let value = read.cards.iter().find_map(|card| match &card.kind {
+    let read = cards(&format!(".param number_={packed}"), flag, Default::default(), d)?;
+    read.cards.iter().find_map(|card| match &card.kind {
         CardKind::Parameters(parameters) => parameters.first()?.1.constant(),
         _ => None,
-    });
-    match value.filter(|value| *value > 0.0 && value.is_finite()) {
+    })
+}
+
+/// A time.
+fn time(text: &str, flag: &str, d: &mut Vec<Diagnostic>) -> Option<f64> {
+    match number(text, flag, d).filter(|value| *value > 0.0 && value.is_finite()) {
         Some(value) => Some(value),
         None => {
             let message = format!("{flag} takes a time above 0, not `{text}`");

@@ -154,11 +154,11 @@ pub fn circuit(circuit: &Circuit) -> String {
                 number(*below),
                 number(*above)
             ),
-            DeviceKind::SmoothSwitch { control, on, off, .. } => format!(
+            DeviceKind::SmoothSwitch(switch) => format!(
                 "switch by {}: smoothly from off at {} to on at {}",
-                text(control),
-                number(*off),
-                number(*on)
+                text(&switch.control),
+                number(switch.off),
+                number(switch.on)
             ),
             DeviceKind::Quantity(quantity) => match quantity {
                 Quantity::Derivative { law } => format!("d/dt of {}", text(law)),

@@ -26,6 +26,7 @@ pub mod bode;
 pub mod tf;
 pub mod paths;
 pub mod tune;
+pub mod sweep;
 pub mod trace;
 pub mod draw;
 pub mod plot;
@@ -87,6 +88,7 @@ pub const COMMANDS: &[Command] = &[
     command!(tf),
     command!(paths),
     command!(tune),
+    command!(sweep),
     command!(trace),
     command!(draw),
     command!(plot),

@@ -145,14 +145,22 @@ pub fn check(
             }
             None
         }
-        Language::Netlist => {
-            let (circuit, _) = circuit(map, file, overrides, d)?;
+        Language::Netlist => std::thread::scope(|scope| {
+            let deck = deck(map, file, overrides, d)?;
+            let circuit = deck.circuit(0, &[], None, d)?;
+            give_back(scope, deck);
             let stamps = stamps::stamp(&circuit, d)?;
-            drop(circuit);
+            give_back(scope, circuit);
             let system = sim::compile(&stamps, d)?;
             Some((stamps, system))
-        }
+        }),
     }
+}
+
+/// Gives back what is no longer needed beside what is done next: a million cards are many pieces of memory.
+fn give_back<'s, T: Send + 's>(scope: &'s std::thread::Scope<'s, '_>, done: T) {
+    // Where there is no thread to be had, it is given back at once.
+    let _ = std::thread::Builder::new().spawn_scoped(scope, move || drop(done));
 }
 
 /// A bond graph with all that is known before it runs.

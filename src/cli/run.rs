@@ -11,6 +11,7 @@ use crate::quantity::nearest;
 use crate::sim::analyses::{self, ANALYSES, Job};
 use crate::sim::{self, Failure, FailureKind, Interval, Progress, Settings, Statistics, System};
 use crate::source::{FileId, SourceMap, Span};
+use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -52,6 +53,18 @@ pub fn prepare(
     pick: Option<&str>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Run> {
+    prepare_with(map, file, overrides, pick, &mut |_, _| {}, d)
+}
+
+/// The same, with a circuit that is completed before anything follows from it.
+pub fn prepare_with(
+    map: &mut SourceMap,
+    file: FileId,
+    overrides: &Overrides,
+    pick: Option<&str>,
+    complete: &mut dyn FnMut(&mut Circuit, &mut Vec<Diagnostic>),
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
     if let Some(name) = pick
         && analyses::row(name).is_none()
     {
@@ -59,7 +72,8 @@ pub fn prepare(
         return None;
     }
     if pipeline::language(map, file) == Language::Bond {
-        let (circuit, units) = pipeline::circuit(map, file, overrides, d)?;
+        let (mut circuit, units) = pipeline::circuit(map, file, overrides, d)?;
+        complete(&mut circuit, d);
         if circuit.analyses.is_empty() {
             let message = "nothing says until when to simulate";
             let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
@@ -79,6 +93,7 @@ pub fn prepare(
         circuit = first?;
         circuit.steps = steps;
     }
+    complete(&mut circuit, d);
     let mut run = ready(circuit, &deck.units, false, pick, d)?;
     run.deck = Some(deck);
     Some(run)
@@ -348,6 +363,12 @@ impl Run {
             None => None,
         };
         made.ok_or(d)
+    }
+
+    /// What it measures.
+    pub fn measures(&self) -> impl Iterator<Item = &Measure> {
+        let own = self.analysis.name();
+        self.circuit.measures.iter().filter(move |measure| measure.is_of(own))
     }
 
     /// An empty trace with this run's columns.

@@ -16,6 +16,7 @@
 //! | 0920-0939 | data files: traces, maps, lists of times | 3 |
 //! | 0940-0999 | usage | 2 |
 //! | 10 | drawings, plots | 3 |
+//! | 12 | sweeps | 3 |
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug)]
@@ -286,6 +287,14 @@ pub const CODES: &[Code] = &[
     row("E1001", "too large to draw", "Nobody can read a picture of more than 160 junctions and elements. Draw instances as one node each with `--depth 0`, or write a `.dot` file, which Graphviz lays out at any size."),
     row("E1010", "no such column", "A column that is to be plotted has no place in any of the traces. The message names the nearest, or all there are."),
     row("N1001", "instances are not laid open", "The whole graph has too many junctions and elements for one picture, so that instances deeper than a level are drawn as one node each. `--depth` says how deep."),
+    // -- 12: sweeps
+    row("E1200", "plan is no TOML", "A plan of a sweep is written in TOML: `key = value` lines, tables as `[set]`, texts in quotes."),
+    row("E1201", "plan says something else", "A plan has the keys model, runs, seed, set, measures, until, step, observe and options, each with values of its own kind; the message says which are meant."),
+    row("E1202", "values that cannot be swept", "A parameter takes a list, a range or a distribution, both ends of one unit, once in a sweep; random values need `runs`, and nothing else does. A `.step` of a netlist is a sweep of its own."),
+    row("E1203", "measure that cannot be taken", "A measure is a function of an item that can be observed, `max(x)` or `at(x, 5 ms)`; `bondspice sweep --help` lists them all."),
+    row("E1204", "table of another sweep", "A sweep goes on only from a table that has its own columns and values, and parts are put together only where they are of one sweep and disjoint."),
+    row("W1200", "runs failed", "Some runs of a sweep did not reach their end. Their measures are empty; the first of them is told in full."),
+    row("W1201", "runs are missing", "The parts that were put together lack a run: one of them is missing or was not finished."),
 ];
 
 /// Stages: the first and the last number of its codes, what it is about, and the exit code of its errors.
@@ -303,6 +312,7 @@ pub const STAGES: &[(u32, u32, &str, u8)] = &[
     (920, 939, "data files", 3),
     (940, 999, "usage", 2),
     (1000, 1099, "drawings and plots", 3),
+    (1200, 1299, "sweeps", 3),
 ];
 
 /// What the stage of a code is about.

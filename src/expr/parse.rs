@@ -291,7 +291,7 @@ fn choice<L>(
     d: &mut Vec<Diagnostic>,
 ) -> Option<Part<L>> {
     let depth = condition.depth.max(then.depth).max(otherwise.depth);
-    join(Node::If(condition.expr, then.expr, otherwise.expr), depth, span, d)
+    join(Node::choice(condition.expr, then.expr, otherwise.expr), depth, span, d)
 }
 
 fn conditional<L: Language>(

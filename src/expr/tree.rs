@@ -26,9 +26,16 @@ pub enum Node<L> {
     /// A function of the table [`FUNCTIONS`](super::functions::FUNCTIONS).
     Call(super::functions::Function, Vec<Expr<L>>),
     /// `if c then a else b`; `c` is true when it is not 0.
-    If(Expr<L>, Expr<L>, Expr<L>),
+    If(Expr<L>, Box<Expr<L>>, Box<Expr<L>>),
     /// Interpolation that holds its end values.
     Table(Expr<L>, Arc<Table>),
+}
+
+impl<L> Node<L> {
+    /// `if condition then … else …`
+    pub fn choice(condition: Expr<L>, then: Expr<L>, otherwise: Expr<L>) -> Node<L> {
+        Node::If(condition, Box::new(then), Box::new(otherwise))
+    }
 }
 
 /// Operators with one operand.
@@ -117,7 +124,7 @@ impl<L> Expr<L> {
 
     /// `if condition then … else …`, generated.
     pub fn choice(condition: Expr<L>, then: Expr<L>, otherwise: Expr<L>) -> Expr<L> {
-        Expr::new(Node::If(condition, then, otherwise), Span::NONE)
+        Expr::new(Node::choice(condition, then, otherwise), Span::NONE)
     }
 
     /// The number of levels of the tree.
@@ -158,7 +165,7 @@ impl<L> Expr<L> {
                 *function,
                 arguments.iter().map(|a| a.try_map(leaf)).collect::<Result<_, E>>()?,
             ),
-            Node::If(c, a, b) => Node::If(c.try_map(leaf)?, a.try_map(leaf)?, b.try_map(leaf)?),
+            Node::If(c, a, b) => Node::choice(c.try_map(leaf)?, a.try_map(leaf)?, b.try_map(leaf)?),
             Node::Table(a, table) => Node::Table(a.try_map(leaf)?, table.clone()),
         };
         Ok(Expr::new(node, self.span))

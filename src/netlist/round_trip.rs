@@ -2,7 +2,7 @@
 
 use super::{Card, CardKind, Device, Element, Expr, Name, Names, Netlist, Shape, Source, Waveform};
 use crate::circuit::{self, Circuit, DeviceKind};
-use crate::expr::{Binary, Function, Node};
+use crate::expr::{Binary, Function};
 use crate::netlist::{
     Leaf,
     flatten::flatten,
@@ -157,7 +157,7 @@ fn tree(
         6 => sub(7).negate(),
         7 => Expr::call(Function::Tanh, vec![sub(4)]),
         8 => Expr::call(Function::Min, vec![sub(1), sub(11)]),
-        9 => Expr::new(Node::If(sub(1).binary(Binary::Less, sub(2)), sub(3), sub(4)), Span::NONE),
+        9 => Expr::choice(sub(1).binary(Binary::Less, sub(2)), sub(3), sub(4)),
         10 => sub(5).binary(Binary::Multiply, sub(8)),
         _ => sub(9).binary(Binary::Add, sub(10)),
     }

@@ -337,7 +337,7 @@ impl<'a> Run<'a> {
                     continue;
                 }
                 Ok(error) => {
-                                self.network.statistics.rejected.error += 1;
+                    self.network.statistics.rejected.error += 1;
                     cuts.note(h, Reason::Error(self.worst_error(), error));
                     self.see_rounding(error);
                     h *= size::after_error(error, power);

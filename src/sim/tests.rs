@@ -5,7 +5,6 @@ use crate::circuit::stamps::{Stamps, stamp};
 use crate::circuit::{
     Circuit, Device, DeviceId, DeviceKind, DiodeModel, Expr, Leaf, Node, NodeId, Waveform,
 };
-use crate::circuit::{DiodeInstance, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Binary, Function};
 use crate::source::Span;
@@ -61,7 +60,7 @@ fn l(inductance: f64, initial: f64) -> DeviceKind {
 }
 
 fn v(waveform: Waveform) -> DeviceKind {
-    DeviceKind::VoltageSource { waveform, parts: Parts::default() }
+    DeviceKind::VoltageSource { waveform: Box::new(waveform), parts: Box::default() }
 }
 
 fn dc(value: f64) -> DeviceKind {
@@ -410,7 +409,7 @@ fn the_operating_point_of_a_diode() {
     };
     let exponential = call(Function::Exp, times(volt(2, 0), Expr::number(1.0 / thermal)));
     let law = times(Expr::number(1e-12), plus(exponential, Expr::number(-1.0)));
-    let diode = DeviceKind::Diode { model: Box::new(model), instance: DiodeInstance::default() };
+    let diode = DeviceKind::Diode { model: Box::new(model), instance: Box::default() };
     for (name, device) in [("D1", diode), ("B1", DeviceKind::BehaviouralCurrent { law })] {
         let system = system(vec![
             ("V1", vec![1, 0], dc(1.0)),
@@ -507,8 +506,8 @@ fn two_switches_may_flip_at_one_instant() {
     let system = system(vec![
         ("V1", vec![1, 0], dc(1.0)),
         ("V2", vec![2, 0], v(ramp)),
-        ("S1", vec![1, 3], switch(volt(2, 0), 0.5)),
-        ("S2", vec![3, 0], switch(volt(0, 2), -0.5)),
+        ("S1", vec![1, 3], switch(Box::new(volt(2, 0)), 0.5)),
+        ("S2", vec![3, 0], switch(Box::new(volt(0, 2)), -0.5)),
         ("L1", vec![3, 4], l(0.1, 1.0)),
         ("R1", vec![4, 0], r(1.0)),
     ]);
@@ -531,7 +530,7 @@ fn two_switches_may_flip_at_one_instant() {
 fn switches_flip_where_their_control_crosses() {
     // A relaxation oscillator: the switch discharges C above 2 V until 1 V.
     let switch = DeviceKind::Switch {
-        control: volt(2, 0),
+        control: Box::new(volt(2, 0)),
         on: 2.0,
         off: 1.0,
         on_resistance: 10.0,
@@ -567,7 +566,7 @@ fn switches_flip_where_their_control_crosses() {
 fn a_switch_that_contradicts_itself_is_named() {
     // Closing takes the control away at once: 5 V open, 0.05 V closed, beyond its hysteresis on either side.
     let switch = DeviceKind::Switch {
-        control: volt(2, 0),
+        control: Box::new(volt(2, 0)),
         on: 2.5,
         off: 2.4,
         on_resistance: 10.0,
@@ -603,7 +602,10 @@ fn floating_nodes_and_loops_of_sources_are_named() {
     let found = errors(vec![(
         "I1",
         vec![0, 1],
-        DeviceKind::CurrentSource { waveform: Waveform::Constant(1.0), parts: Parts::default() },
+        DeviceKind::CurrentSource {
+            waveform: Box::new(Waveform::Constant(1.0)),
+            parts: Box::default(),
+        },
     )]);
     assert_eq!(found[0].code, "E0780");
 }

@@ -52,7 +52,7 @@ impl<W: Write> Sink for Rows<W> {
 }
 
 /// A name as it stands in a header: in quotes where it holds anything that may separate names, or nothing.
-fn quoted(name: &str) -> String {
+pub(crate) fn quoted(name: &str) -> String {
     match name.is_empty() || name.contains([',', ';', '\t', '"', '\r', '\n']) {
         true => format!("\"{}\"", name.replace('"', "\"\"")),
         false => name.to_string(),

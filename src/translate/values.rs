@@ -100,7 +100,7 @@ fn tidied(expr: Expr) -> (Expr, bool) {
         Node::Call(function, arguments) => {
             (at(Node::Call(function, arguments.into_iter().map(tidy).collect())), false)
         }
-        Node::If(c, a, b) => (at(Node::If(tidy(c), tidy(a), tidy(b))), false),
+        Node::If(c, a, b) => (at(Node::choice(tidy(c), tidy(*a), tidy(*b))), false),
         Node::Table(a, table) => (at(Node::Table(tidy(a), table)), false),
         Node::Number(value) if value < 0.0 => (at(Node::Number(-value)), true),
         node @ (Node::Number(_) | Node::Leaf(_)) => (at(node), false),

@@ -119,12 +119,13 @@ impl Check<'_> {
             self.value(device, "what it starts from", is, should, relative);
         }
         for device in 0..self.text.circuit.devices.len() {
-            if let DeviceKind::Line { initial, .. } = self.text.circuit.devices[device].kind
+            if let DeviceKind::Line { initial, .. } = &self.text.circuit.devices[device].kind
                 && let Start::Signal(id) = self.text.start(self.graph, device)
             {
                 let start = self.signal(id);
                 let should = [start, start, start, -start];
-                for (is, should) in initial.unwrap_or([0.0; 4]).into_iter().zip(should) {
+                let initial = initial.as_deref().copied().unwrap_or([0.0; 4]);
+                for (is, should) in initial.into_iter().zip(should) {
                     let what = "what it starts from";
                     self.value(device, what, is, should, ULPS * f64::EPSILON);
                 }
@@ -221,7 +222,7 @@ impl Check<'_> {
         let (
             DeviceKind::Switch { on, off, on_resistance, off_resistance, initially_on, .. },
             DeviceKind::Resistor { resistance },
-            DeviceKind::VoltageSource { waveform: Waveform::Constant(volts), .. },
+            DeviceKind::VoltageSource { waveform, .. },
             DeviceKind::BehaviouralVoltage { law },
         ) = (
             &circuit[switch].kind,
@@ -232,6 +233,7 @@ impl Check<'_> {
         else {
             return missing();
         };
+        let Waveform::Constant(volts) = **waveform else { return missing() };
         let threshold = |is: f64, should: f64| {
             near(is, should, 1e-12)
                 || (is - should).abs() <= 4.0 * f64::EPSILON * low.abs().max(high.abs())

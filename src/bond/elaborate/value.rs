@@ -470,7 +470,7 @@ fn with_signs(expr: Expr) -> Expr {
         Node::Unary(op, a) => Node::Unary(op, with_signs(a)),
         Node::Binary(op, a, b) => Node::Binary(op, with_signs(a), with_signs(b)),
         Node::Call(f, a) => Node::Call(f, a.into_iter().map(with_signs).collect()),
-        Node::If(c, a, b) => Node::If(with_signs(c), with_signs(a), with_signs(b)),
+        Node::If(c, a, b) => Node::choice(with_signs(c), with_signs(*a), with_signs(*b)),
         Node::Table(a, table) => Node::Table(with_signs(a), table),
         other => other,
     };

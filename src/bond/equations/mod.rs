@@ -493,7 +493,7 @@ impl Equations {
             Node::Call(function, arguments) => {
                 Node::Call(*function, arguments.iter().map(|a| self.lower(graph, a, own)).collect())
             }
-            Node::If(c, a, b) => Node::If(
+            Node::If(c, a, b) => Node::choice(
                 self.lower(graph, c, own),
                 self.lower(graph, a, own),
                 self.lower(graph, b, own),

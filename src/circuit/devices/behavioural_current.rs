@@ -6,6 +6,7 @@
 use super::{Branch, Needs, Row};
 use crate::circuit::stamper::{Current, Stamper};
 use crate::circuit::{DeviceId, DeviceKind};
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -16,8 +17,6 @@ pub const ROW: Row = Row {
     stamp,
     current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let law = current(stamper, id);
     match stamper.branch(id) {

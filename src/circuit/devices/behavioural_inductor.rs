@@ -14,6 +14,7 @@ use crate::circuit::stamper::{Current, Stamper};
 use crate::circuit::stamps::{Law, Leaf};
 use crate::circuit::{DeviceId, DeviceKind, LawOf};
 use crate::expr::Binary;
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -30,8 +31,6 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralInductor { law, law_of, initial } = &stamper.device(id).kind else {
         return;

@@ -7,6 +7,7 @@ use crate::circuit::stamper::{Current, Stamper};
 use crate::circuit::stamps::{Law, Leaf};
 use crate::circuit::{DeviceId, DeviceKind};
 use crate::expr::Binary;
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -17,8 +18,6 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralResistor { law } = &stamper.device(id).kind else { return };
     let Some(branch) = stamper.branch(id) else { return };

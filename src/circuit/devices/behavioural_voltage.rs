@@ -3,6 +3,7 @@
 use super::{Needs, Row, no_current};
 use crate::circuit::stamper::{Current, Stamper};
 use crate::circuit::{DeviceId, DeviceKind};
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -13,8 +14,6 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::BehaviouralVoltage { law } = &stamper.device(id).kind else { return };
     let Some(branch) = stamper.branch(id) else { return };

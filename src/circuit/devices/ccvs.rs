@@ -29,10 +29,10 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 
 #[cfg(test)]
 mod tests {
+    use crate::circuit::DeviceId;
     use crate::circuit::DeviceKind::{Capacitor, Ccvs, VoltageSource};
     use crate::circuit::Waveform;
     use crate::circuit::devices::testing::*;
-    use crate::circuit::{DeviceId, Parts};
 
     #[test]
     fn follows_a_branch_or_a_rate() {
@@ -40,7 +40,10 @@ mod tests {
             (
                 "v1",
                 vec![1, 0],
-                VoltageSource { waveform: Waveform::Constant(0.0), parts: Parts::default() },
+                VoltageSource {
+                    waveform: Box::new(Waveform::Constant(0.0)),
+                    parts: Box::default(),
+                },
             ),
             ("h1", vec![2, 0], Ccvs { gain: 3.0, control: DeviceId(0) }),
             ("c1", vec![2, 0], Capacitor { capacitance: 1.0, initial: None }),

@@ -69,7 +69,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
     };
     let at_least =
         |limit: f64| stamper.law(control).binary(Binary::GreaterEqual, Law::number(limit));
-    let choice = |c, a, b| Law::new(Node::If(c, a, b), Span::NONE);
+    let choice = |c, a, b| Law::new(Node::choice(c, a, b), Span::NONE);
     let from_below = Law::new(Node::Unary(Unary::Not, Law::leaf(Leaf::Mode(mode))), Span::NONE);
     let within = choice(at_least(*below), from_below, Law::number(0.0));
     let closed = choice(at_least(*above), Law::number(1.0), within);
@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn within_the_band_it_is_what_it_is_becoming() {
         let switch = CrossedSwitch {
-            control: Expr::leaf(Leaf::Voltage(NodeId(2), NodeId(0))),
+            control: Box::new(Expr::leaf(Leaf::Voltage(NodeId(2), NodeId(0)))),
             above: 2.0,
             below: 1.0,
             on_resistance: 0.5,

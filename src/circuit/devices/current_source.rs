@@ -5,6 +5,7 @@
 use super::{Branch, Needs, Row, no_current};
 use crate::circuit::stamper::Stamper;
 use crate::circuit::{DeviceId, DeviceKind};
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -15,20 +16,18 @@ pub const ROW: Row = Row {
     stamp,
     current: no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::CurrentSource { waveform, parts } = &stamper.device(id).kind else { return };
     match stamper.branch(id) {
         Some(branch) => {
             stamper.through(id, branch);
             stamper.conductance(Some(branch), Some(branch), 1.0);
-            stamper.add_source(id, waveform, *parts, smallvec![(branch, 1.0)]);
+            stamper.add_source(id, waveform, **parts, smallvec![(branch, 1.0)]);
         }
         None => {
             let leaving = stamper.leaving(stamper.ends(id));
             let right = leaving.into_iter().map(|(row, sign)| (row, -sign)).collect();
-            stamper.add_source(id, waveform, *parts, right);
+            stamper.add_source(id, waveform, **parts, right);
         }
     }
 }
@@ -37,13 +36,16 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 mod tests {
     use crate::circuit::DeviceKind::{Ccvs, CurrentSource};
     use crate::circuit::devices::testing::*;
-    use crate::circuit::{DeviceId, Parts, Waveform};
+    use crate::circuit::{DeviceId, Waveform};
 
     #[test]
     fn draws_from_its_first_node() {
         let waveform = Waveform::Constant(2.0);
-        let stamps =
-            stamps(vec![("i1", vec![1, 2], CurrentSource { waveform, parts: Parts::default() })]);
+        let stamps = stamps(vec![(
+            "i1",
+            vec![1, 2],
+            CurrentSource { waveform: Box::new(waveform), parts: Box::default() },
+        )]);
         assert_eq!(sources(&stamps, 0.0), [-2.0, 2.0]);
     }
 
@@ -51,7 +53,11 @@ mod tests {
     fn has_a_branch_where_it_is_read() {
         let waveform = Waveform::Constant(2.0);
         let stamps = stamps(vec![
-            ("i1", vec![1, 0], CurrentSource { waveform, parts: Parts::default() }),
+            (
+                "i1",
+                vec![1, 0],
+                CurrentSource { waveform: Box::new(waveform), parts: Box::default() },
+            ),
             ("h1", vec![2, 0], Ccvs { gain: 3.0, control: DeviceId(0) }),
         ]);
         let expected = [

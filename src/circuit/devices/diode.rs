@@ -170,7 +170,7 @@ fn times(a: Law, b: Law) -> Law {
 
 /// a where v < limit, else b.
 fn below(v: Law, limit: f64, a: Law, b: Law) -> Law {
-    Law::new(Node::If(v.binary(Binary::Less, number(limit)), a, b), Span::NONE)
+    Law::new(Node::choice(v.binary(Binary::Less, number(limit)), a, b), Span::NONE)
 }
 
 /// factor·(e^(v/thermal) − 1)
@@ -272,7 +272,11 @@ mod tests {
 
     fn diode(model: DiodeModel, area: f64) -> crate::circuit::stamps::Stamps {
         let instance = DiodeInstance { area, ..DiodeInstance::default() };
-        stamps(vec![("D1", vec![1, 0], DeviceKind::Diode { model: Box::new(model), instance })])
+        stamps(vec![(
+            "D1",
+            vec![1, 0],
+            DeviceKind::Diode { model: Box::new(model), instance: Box::new(instance) },
+        )])
     }
 
     fn at(law: &Law, v: f64) -> f64 {
@@ -352,7 +356,7 @@ mod tests {
             DiodeModel { emission: -1.0, ..MODEL },
             DiodeModel { grading: 1.0, ..MODEL },
         ] {
-            let instance = DiodeInstance::default();
+            let instance = Box::<DiodeInstance>::default();
             let model = Box::new(model);
             let circuit = circuit(vec![("d1", vec![1, 0], DeviceKind::Diode { model, instance })]);
             let mut diagnostics = vec![];

@@ -9,6 +9,7 @@ use super::{Needs, Row};
 use crate::circuit::stamper::{Stamper, voltage};
 use crate::circuit::stamps::{MemoryKind, MemoryStamp};
 use crate::circuit::{DeviceId, DeviceKind};
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -19,8 +20,6 @@ pub const ROW: Row = Row {
     stamp,
     current: super::no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Hold { period, round } = stamper.device(id).kind else { return };
     if !stamper.finite(id, &[("period", period)]) {

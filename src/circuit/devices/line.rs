@@ -14,6 +14,7 @@ use crate::circuit::stamper::{Stamper, voltage};
 use crate::circuit::stamps::{Law, Leaf, MemoryKind, MemoryStamp, UnknownId};
 use crate::circuit::{DeviceId, DeviceKind};
 use crate::expr::Binary;
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -24,11 +25,10 @@ pub const ROW: Row = Row {
     stamp,
     current: super::no_current,
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let device = stamper.device(id);
-    let DeviceKind::Line { impedance, delay, initial } = device.kind else { return };
+    let DeviceKind::Line { impedance, delay, initial } = &device.kind else { return };
+    let (impedance, delay) = (*impedance, *delay);
     if !stamper.finite(id, &[("impedance", impedance), ("delay", delay)]) {
         return;
     }
@@ -52,7 +52,8 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         let current = Law::leaf(Leaf::Unknown(branch));
         voltage(ends).binary(Binary::Add, Law::number(impedance).binary(Binary::Multiply, current))
     };
-    let start = initial.map(|[v1, i1, v2, i2]| [v1 + impedance * i1, v2 + impedance * i2]);
+    let start =
+        initial.as_deref().map(|[v1, i1, v2, i2]| [v1 + impedance * i1, v2 + impedance * i2]);
     for (row, from, initial) in [(0, 1, start.map(|s| s[1])), (1, 0, start.map(|s| s[0]))] {
         stamper.stamps.memories.push(MemoryStamp {
             device: id,
@@ -72,7 +73,8 @@ mod tests {
 
     #[test]
     fn each_end_sees_the_wave_of_the_other() {
-        let line = Line { impedance: 50.0, delay: 1e-9, initial: Some([1.0, 0.02, 3.0, -0.04]) };
+        let line =
+            Line { impedance: 50.0, delay: 1e-9, initial: Some(Box::new([1.0, 0.02, 3.0, -0.04])) };
         let stamps = stamps(vec![("t1", vec![1, 0, 2, 3], line)]);
         // v1 v2 v3 i1 i2
         assert_eq!(

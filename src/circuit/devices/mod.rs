@@ -55,7 +55,7 @@ pub struct Needs {
     /// A second branch.
     pub second: bool,
     /// Unknowns that no output shows unasked, at most 2.
-    pub hidden: usize,
+    pub hidden: u8,
 }
 
 impl Needs {
@@ -135,7 +135,7 @@ pub fn row(kind: &DeviceKind) -> &'static Row {
         DeviceKind::BehaviouralInductor { .. } => &behavioural_inductor::ROW,
         DeviceKind::Switch { .. } => &switch::ROW,
         DeviceKind::CrossedSwitch { .. } => &crossed_switch::ROW,
-        DeviceKind::SmoothSwitch { .. } => &smooth_switch::ROW,
+        DeviceKind::SmoothSwitch(_) => &smooth_switch::ROW,
         DeviceKind::Line { .. } => &line::ROW,
         DeviceKind::Hold { .. } => &hold::ROW,
         DeviceKind::Quantity(_) => &quantity::ROW,

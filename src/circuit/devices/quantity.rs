@@ -13,6 +13,7 @@ use super::{Needs, Row};
 use crate::circuit::stamper::{Current, Stamper};
 use crate::circuit::stamps::{Law, Leaf, MemoryKind, MemoryStamp};
 use crate::circuit::{DeviceId, DeviceKind, Parts, Quantity};
+use smallvec::smallvec;
 
 /// The row of the table.
 pub const ROW: Row = Row {
@@ -31,8 +32,6 @@ pub const ROW: Row = Row {
         Current::Linear(stamper.hidden(id, 0).map(|u| (u, 1.0)).into_iter().collect())
     },
 };
-use smallvec::smallvec;
-
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let DeviceKind::Quantity(quantity) = &stamper.device(id).kind else { return };
     let Some(own) = stamper.hidden(id, 0) else { return };
@@ -136,7 +135,10 @@ mod tests {
         );
         assert_eq!(value(&memory.input, &[0.0, 0.0, 0.0, 8.0], &[], &[], 0.0), 8.0);
         let waveform = Waveform::Pwl(vec![(0.0, 0.0), (1.0, 6.0)]);
-        assert_eq!(sources(&read(Quantity::Signal { waveform }), 0.5), [0.0, 0.0, 3.0]);
+        assert_eq!(
+            sources(&read(Quantity::Signal { waveform: Box::new(waveform) }), 0.5),
+            [0.0, 0.0, 3.0]
+        );
     }
 
     #[test]

@@ -15,7 +15,7 @@
 use super::{Needs, Row};
 use crate::circuit::stamper::{Current, Stamper, voltage};
 use crate::circuit::stamps::{Law, Leaf, Mode};
-use crate::circuit::{DeviceId, DeviceKind};
+use crate::circuit::{DeviceId, DeviceKind, SmoothSwitch};
 use crate::expr::{Binary, Function, Node};
 use crate::source::Span;
 
@@ -25,11 +25,8 @@ pub const ROW: Row = Row {
     letters: "SW",
     equation: "ln R = ln sqrt(Ron Roff) + ln(Ron/Roff) (3 u - u^3)/4",
     needs: |kind| {
-        let remembers = matches!(
-            kind,
-            DeviceKind::SmoothSwitch { holds_on: Some(_), .. }
-                | DeviceKind::SmoothSwitch { holds_off: Some(_), .. }
-        );
+        let DeviceKind::SmoothSwitch(switch) = kind else { return Needs::NOTHING };
+        let remembers = switch.holds_on.is_some() || switch.holds_off.is_some();
         Needs { mode: remembers, ..Needs::NOTHING }
     },
     stamp,
@@ -37,7 +34,8 @@ pub const ROW: Row = Row {
 };
 
 fn stamp(stamper: &mut Stamper, id: DeviceId) {
-    let DeviceKind::SmoothSwitch {
+    let DeviceKind::SmoothSwitch(switch) = &stamper.device(id).kind else { return };
+    let SmoothSwitch {
         control,
         on,
         off,
@@ -46,10 +44,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         on_resistance,
         off_resistance,
         initially_on,
-    } = &stamper.device(id).kind
-    else {
-        return;
-    };
+    } = &**switch;
     let values = [
         ("Ron", *on_resistance),
         ("Roff", *off_resistance),
@@ -83,19 +78,12 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
 }
 
 fn current(stamper: &Stamper, id: DeviceId) -> Current {
-    let DeviceKind::SmoothSwitch {
-        control,
-        on,
-        off,
-        holds_on,
-        holds_off,
-        on_resistance,
-        off_resistance,
-        ..
-    } = &stamper.device(id).kind
-    else {
+    let DeviceKind::SmoothSwitch(switch) = &stamper.device(id).kind else {
         return Current::nothing();
     };
+    let SmoothSwitch {
+        control, on, off, holds_on, holds_off, on_resistance, off_resistance, ..
+    } = &**switch;
     let middle = 0.5 * (on_resistance * off_resistance).ln();
     let ratio = (on_resistance / off_resistance).ln();
     let number = Law::number;
@@ -116,7 +104,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
         Some(mode) => {
             let when_on = conductance(*off, holds_on.unwrap_or(*on));
             let when_off = conductance(holds_off.unwrap_or(*off), *on);
-            Law::new(Node::If(Law::leaf(Leaf::Mode(mode)), when_on, when_off), Span::NONE)
+            Law::new(Node::choice(Law::leaf(Leaf::Mode(mode)), when_on, when_off), Span::NONE)
         }
         None => conductance(*off, *on),
     };
@@ -132,7 +120,7 @@ mod tests {
     use crate::expr::Dag;
 
     fn switch(on: f64, off: f64, holds: Option<(f64, f64)>) -> DeviceKind {
-        DeviceKind::SmoothSwitch {
+        DeviceKind::SmoothSwitch(Box::new(SmoothSwitch {
             control: Expr::leaf(Leaf::Voltage(NodeId(2), NodeId(0))),
             on,
             off,
@@ -141,7 +129,7 @@ mod tests {
             on_resistance: 1.0,
             off_resistance: 100.0,
             initially_on: None,
-        }
+        }))
     }
 
     fn stamps(kind: DeviceKind) -> Option<Stamps> {

@@ -72,7 +72,7 @@ fn current(stamper: &Stamper, id: DeviceId) -> Current {
         None => stamper.law(control).binary(Binary::GreaterEqual, Law::number(*on)),
     };
     let (on, off) = (Law::number(1.0 / on_resistance), Law::number(1.0 / off_resistance));
-    let conductance = Law::new(Node::If(closed, on, off), Span::NONE);
+    let conductance = Law::new(Node::choice(closed, on, off), Span::NONE);
     Current::Law(conductance.binary(Binary::Multiply, voltage(stamper.ends(id))))
 }
 
@@ -84,7 +84,7 @@ mod tests {
     use crate::circuit::{self, Expr, NodeId};
 
     fn switch(on: f64, off: f64) -> circuit::DeviceKind {
-        let control = Expr::leaf(circuit::Leaf::Voltage(NodeId(3), NodeId(0)));
+        let control = Box::new(Expr::leaf(circuit::Leaf::Voltage(NodeId(3), NodeId(0))));
         Switch {
             control,
             on,

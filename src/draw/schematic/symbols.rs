@@ -29,7 +29,7 @@ pub fn symbol(device: &Device) -> Symbol {
         DeviceKind::Resistor { .. } | DeviceKind::BehaviouralResistor { .. } => Symbol::Resistor,
         DeviceKind::Capacitor { .. } | DeviceKind::BehaviouralCapacitor { .. } => Symbol::Capacitor,
         DeviceKind::Inductor { .. } | DeviceKind::BehaviouralInductor { .. } => Symbol::Inductor,
-        DeviceKind::VoltageSource { waveform: Waveform::Constant(value), .. } if *value == 0.0 => {
+        DeviceKind::VoltageSource { waveform, .. } if **waveform == Waveform::Constant(0.0) => {
             Symbol::Sense
         }
         DeviceKind::VoltageSource { .. } => Symbol::VoltageSource,
@@ -42,7 +42,7 @@ pub fn symbol(device: &Device) -> Symbol {
         | DeviceKind::BehaviouralCurrent { .. } => Symbol::ControlledCurrent,
         DeviceKind::Switch { .. }
         | DeviceKind::CrossedSwitch { .. }
-        | DeviceKind::SmoothSwitch { .. } => Symbol::Switch,
+        | DeviceKind::SmoothSwitch(_) => Symbol::Switch,
         DeviceKind::Diode { .. } => Symbol::Diode,
         _ => Symbol::Block,
     }
@@ -66,7 +66,7 @@ pub fn value(circuit: &Circuit, device: &Device) -> String {
         DeviceKind::Capacitor { capacitance, .. } => short(*capacitance),
         DeviceKind::Inductor { inductance, .. } => short(*inductance),
         DeviceKind::VoltageSource { waveform, .. } | DeviceKind::CurrentSource { waveform, .. } => {
-            match waveform {
+            match &**waveform {
                 Waveform::Constant(value) if *value != 0.0 => short(*value),
                 Waveform::Constant(_) => String::new(),
                 _ => "f(t)".into(),

@@ -1,7 +1,7 @@
 //! Small circuits with known schematics.
 
 use super::*;
-use crate::circuit::{Circuit, Device, DeviceKind, Node, NodeId, Parts, Waveform};
+use crate::circuit::{Circuit, Device, DeviceKind, Node, NodeId, Waveform};
 use crate::source::Span;
 
 fn circuit(nodes: &[&str], devices: &[(&str, u32, u32, char)]) -> Circuit {
@@ -12,8 +12,8 @@ fn circuit(nodes: &[&str], devices: &[(&str, u32, u32, char)]) -> Circuit {
         kind: match kind {
             'c' => DeviceKind::Capacitor { capacitance: 2.2e-5, initial: None },
             'v' => DeviceKind::VoltageSource {
-                waveform: Waveform::Constant(5.0),
-                parts: Parts::default(),
+                waveform: Box::new(Waveform::Constant(5.0)),
+                parts: Box::default(),
             },
             _ => DeviceKind::Resistor { resistance: 4700.0 },
         },

@@ -92,7 +92,10 @@ impl Flat<'_> {
                 span: joint.card.span,
             };
             let parts = circuit::Parts::default();
-            let kind = circuit::DeviceKind::VoltageSource { waveform: constant, parts };
+            let kind = circuit::DeviceKind::VoltageSource {
+                waveform: Box::new(constant),
+                parts: Box::new(parts),
+            };
             made.push(device(joint.name.clone(), [outer, inner], kind));
             let kind = circuit::DeviceKind::Cccs { gain: joint.copies - 1.0, control: sense };
             made.push(device(format!("{}#others", joint.name), [outer, NodeId(0)], kind));

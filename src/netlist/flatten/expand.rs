@@ -65,7 +65,7 @@ pub struct Pending<'n> {
     /// Its nodes.
     pub nodes: Nodes<NodeId>,
     /// Which pair of inductors, for a K of several.
-    pub pair: (usize, usize),
+    pub pair: (u32, u32),
 }
 
 /// Expands a netlist.
@@ -368,18 +368,17 @@ impl<'n> Expander<'n> {
                 self.instance(id, card, device, *subcircuit, parameters, &nodes, d);
             }
             Element::Mutual { inductors, .. } => {
-                for first in 0..inductors.len() {
-                    for second in first + 1..inductors.len() {
-                        let pair = (first, second);
-                        self.flat.devices.push(Pending {
-                            card,
-                            device,
-                            scope: id,
-                            nodes: Nodes::new(),
-                            pair,
-                        });
-                    }
-                }
+                let count = inductors.len() as u32;
+                let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b)));
+                // Thousands of inductors have millions of pairs.
+                let room = (MOST + 1).saturating_sub(self.flat.devices.len());
+                self.flat.devices.extend(pairs.take(room).map(|pair| Pending {
+                    card,
+                    device,
+                    scope: id,
+                    nodes: Nodes::new(),
+                    pair,
+                }));
             }
             _ => self.flat.devices.push(Pending { card, device, scope: id, nodes, pair: (0, 0) }),
         }

@@ -7,7 +7,7 @@ use super::scope;
 use super::sources::{self, Times};
 use super::values::Lookup;
 use crate::circuit::{
-    self, Device, DeviceKind, DiodeInstance, DiodeModel, Knee, LawOf, NodeId, Parts,
+    self, Device, DeviceKind, DiodeInstance, DiodeModel, Knee, LawOf, NodeId, Parts, SmoothSwitch,
 };
 use crate::diagnostic::Diagnostic;
 use crate::netlist::header::Header;
@@ -41,15 +41,12 @@ fn sampled(flat: &Flat, pending: &Pending, header: &Header) -> Option<DeviceKind
     let name = flat.device_name(pending);
     let is = |other: &str| other.eq_ignore_ascii_case(&name);
     header.samples.iter().find_map(|sample| {
-        let nothing = circuit::Waveform::Constant(0.0);
+        let nothing = Box::new(circuit::Waveform::Constant(0.0));
+        let parts = Box::<Parts>::default();
         match (is(&sample.switch), is(&sample.capacitor), is(&sample.clock)) {
             (true, ..) => Some(DeviceKind::Hold { period: sample.period, round: sample.round }),
-            (_, true, _) => {
-                Some(DeviceKind::CurrentSource { waveform: nothing, parts: Parts::default() })
-            }
-            (.., true) => {
-                Some(DeviceKind::VoltageSource { waveform: nothing, parts: Parts::default() })
-            }
+            (_, true, _) => Some(DeviceKind::CurrentSource { waveform: nothing, parts }),
+            (.., true) => Some(DeviceKind::VoltageSource { waveform: nothing, parts }),
             _ => None,
         }
     })
@@ -114,7 +111,8 @@ fn kind(
         },
         Element::Mutual { inductors, coupling } => {
             let (first, second) = pending.pair;
-            let (first, second) = (*inductors.get(first)?, *inductors.get(second)?);
+            let first = *inductors.get(first as usize)?;
+            let second = *inductors.get(second as usize)?;
             let first = lookup.device(scope, first, span, d);
             let second = lookup.device(scope, second, span, d);
             DeviceKind::Mutual { inductors: [first?, second?], coupling: number(coupling, d)? }
@@ -125,7 +123,7 @@ fn kind(
             }
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
-            DeviceKind::VoltageSource { waveform: waveform?, parts: parts? }
+            DeviceKind::VoltageSource { waveform: Box::new(waveform?), parts: Box::new(parts?) }
         }
         Element::CurrentSource(source) => {
             if let Some(law) = moving(source) {
@@ -133,7 +131,7 @@ fn kind(
             }
             let waveform = sources::waveform(lookup, pending, &source.waveform, header, times, d);
             let parts = sources::parts(lookup, pending, source, d);
-            DeviceKind::CurrentSource { waveform: waveform?, parts: parts? }
+            DeviceKind::CurrentSource { waveform: Box::new(waveform?), parts: Box::new(parts?) }
         }
         Element::Vcvs { gain, control } => {
             let (gain, control) = (number(gain, d), nodes(control, d));
@@ -163,7 +161,7 @@ fn kind(
                 None => None,
             };
             let (impedance, delay) = (number(impedance, d), number(delay, d));
-            DeviceKind::Line { impedance: impedance?, delay: delay?, initial: values }
+            DeviceKind::Line { impedance: impedance?, delay: delay?, initial: values.map(Box::new) }
         }
         Element::BehaviouralVoltage { law } => {
             let law = lookup.law(scope, law, d)?;
@@ -269,7 +267,7 @@ fn switch(
     };
     if smooth {
         let (on_resistance, off_resistance) = resistances(SMOOTH);
-        return Some(DeviceKind::SmoothSwitch {
+        return Some(DeviceKind::SmoothSwitch(Box::new(SmoothSwitch {
             control,
             on: ends.0.unwrap_or(if current { 1e-3 } else { 1.0 }),
             off: ends.1.unwrap_or(0.0),
@@ -278,32 +276,34 @@ fn switch(
             on_resistance,
             off_resistance,
             initially_on: on,
-        });
+        })));
     }
     let (on_resistance, off_resistance) = resistances(CRISP);
     let (threshold, half) = (middle.0.unwrap_or(0.0), middle.1.unwrap_or(0.0));
     let (above, below) = (threshold + half.abs(), threshold - half.abs());
     Some(match half < 0.0 {
         false => DeviceKind::Switch {
-            control,
+            control: Box::new(control),
             on: above,
             off: below,
             on_resistance,
             off_resistance,
             initially_on: on,
         },
-        true if lookup.flat.smooth_when_negative() => DeviceKind::SmoothSwitch {
-            control,
-            on: above,
-            off: below,
-            holds_on: None,
-            holds_off: None,
-            on_resistance,
-            off_resistance,
-            initially_on: on,
-        },
+        true if lookup.flat.smooth_when_negative() => {
+            DeviceKind::SmoothSwitch(Box::new(SmoothSwitch {
+                control,
+                on: above,
+                off: below,
+                holds_on: None,
+                holds_off: None,
+                on_resistance,
+                off_resistance,
+                initially_on: on,
+            }))
+        }
         true => DeviceKind::CrossedSwitch {
-            control,
+            control: Box::new(control),
             above,
             below,
             on_resistance,
@@ -381,7 +381,7 @@ fn diode(
         multiplicity: own.get("m"),
         temperature: own.given("temp").unwrap_or(lookup.flat.temperature + own.get("dtemp")),
     };
-    Some(DeviceKind::Diode { model: Box::new(model), instance })
+    Some(DeviceKind::Diode { model: Box::new(model), instance: Box::new(instance) })
 }
 
 /// Whether any device stands at ground.

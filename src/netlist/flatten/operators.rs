@@ -47,7 +47,7 @@ impl Lookup<'_, '_> {
                 );
                 return None;
             }
-            return Some(self.quantity(Quantity::Signal { waveform }, span));
+            return Some(self.quantity(Quantity::Signal { waveform: Box::new(waveform) }, span));
         }
         let law = self.law(id, arguments.first()?, d)?;
         if operator == Operator::Table {
@@ -134,7 +134,7 @@ impl Lookup<'_, '_> {
             {
                 let points = table.x.iter().copied().zip(table.y.iter().copied()).collect();
                 let waveform = circuit::Waveform::Pwl(points);
-                return self.quantity(Quantity::Signal { waveform }, law.span);
+                return self.quantity(Quantity::Signal { waveform: Box::new(waveform) }, law.span);
             }
             Node::Table(x, table) => Node::Table(part(x), table.clone()),
             Node::Unary(op, a) => Node::Unary(*op, part(a)),
@@ -142,7 +142,7 @@ impl Lookup<'_, '_> {
             Node::Call(function, arguments) => {
                 Node::Call(*function, arguments.iter().map(part).collect())
             }
-            Node::If(c, a, b) => Node::If(part(c), part(a), part(b)),
+            Node::If(c, a, b) => Node::choice(part(c), part(a), part(b)),
         };
         circuit::Expr::new(node, law.span)
     }

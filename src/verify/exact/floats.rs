@@ -168,7 +168,7 @@ impl<F: Modular> Sides<'_, '_, F> {
             Node::Unary(op, a) => Node::Unary(*op, part(a)),
             Node::Binary(op, a, b) => Node::Binary(*op, part(a), part(b)),
             Node::Call(function, all) => Node::Call(*function, all.iter().map(part).collect()),
-            Node::If(c, a, b) => Node::If(part(c), part(a), part(b)),
+            Node::If(c, a, b) => Node::choice(part(c), part(a), part(b)),
             Node::Table(a, table) => Node::Table(part(a), table.clone()),
             node @ (Node::Number(_) | Node::Leaf(_)) => node.clone(),
         };

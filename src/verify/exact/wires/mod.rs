@@ -136,7 +136,7 @@ impl<'t, F: Modular> Wires<'t, F> {
             | DeviceKind::Vccs { .. }
             | DeviceKind::Switch { .. }
             | DeviceKind::CrossedSwitch { .. }
-            | DeviceKind::SmoothSwitch { .. }
+            | DeviceKind::SmoothSwitch(_)
             | DeviceKind::BehaviouralCapacitor { .. }
             | DeviceKind::Quantity(_)
             | DeviceKind::Diode { .. } => false,

@@ -1,0 +1,206 @@
+//! One run of a sweep: the model with its settings, simulated, measured.
+
+use super::Sweep;
+use crate::analysis::sweep::Setting;
+use crate::bond::elaborate::Overrides;
+use crate::circuit::{Circuit, Output};
+use crate::cli::pipeline::{Language, language};
+use crate::cli::run::{self, Run};
+use crate::cli::session::{Exit, Session};
+use crate::diagnostic::{Diagnostic, Severity, has_errors};
+use crate::sim::FailureKind;
+use crate::source::{SourceMap, Span};
+use crate::trace::formats::Heading;
+use crate::trace::measure::{Measure, Outcome};
+use crate::trace::{Sink, csv};
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Makes runs.
+pub struct Runner<'a> {
+    sweep: &'a Sweep,
+    bond: bool,
+    /// The items of measures, each once, and which of them each measure takes.
+    items: Vec<String>,
+    places: Vec<usize>,
+    traces: Option<PathBuf>,
+}
+
+/// A row of the table.
+pub struct Row {
+    /// The number of the run.
+    pub run: u64,
+    /// What it set.
+    pub settings: Vec<Setting>,
+    /// What was measured, in the order of the header; nothing where it failed.
+    pub values: Vec<Option<f64>>,
+    /// Why it did not end well.
+    pub failure: Option<Box<Diagnostic>>,
+}
+
+impl<'a> Runner<'a> {
+    /// # Errors
+    /// The exit code, when what is wrong has been said.
+    pub fn new(
+        sweep: &'a Sweep,
+        traces: Option<&str>,
+        session: &mut Session,
+    ) -> Result<Runner<'a>, Exit> {
+        let mut items: Vec<String> = vec![];
+        let mut places = vec![];
+        for (wanted, _) in &sweep.measures {
+            let known = items.iter().position(|item| *item == wanted.item);
+            places.push(known.unwrap_or(items.len()));
+            if known.is_none() {
+                items.push(wanted.item.clone());
+            }
+        }
+        if let Some(folder) = traces {
+            std::fs::create_dir_all(folder).map_err(|error| session.unwritable(folder, &error))?;
+        }
+        let bond = language(&session.map, sweep.file) == Language::Bond;
+        Ok(Runner { sweep, bond, items, places, traces: traces.map(PathBuf::from) })
+    }
+
+    /// The header of the table, from a run that is only prepared.
+    pub fn header(
+        &self,
+        run: u64,
+        map: &mut SourceMap,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Vec<String>> {
+        let settings = self.sweep.space.settings(run);
+        let prepared = self.prepare(&settings, map, d)?;
+        let measures: Vec<&str> =
+            prepared.measures().map(|measure| measure.name.as_str()).collect();
+        if measures.is_empty() && self.traces.is_none() {
+            let error = Diagnostic::error("E1203", Span::NONE, "nothing is measured");
+            d.push(
+                error.help(
+                    "say what to take from each run: --measure 'peak=max(x)', or --traces DIR",
+                ),
+            );
+            return None;
+        }
+        let names = self.sweep.space.names();
+        let header: Vec<String> =
+            ["run"].into_iter().chain(names).chain(measures).map(String::from).collect();
+        let twice = header.iter().enumerate().find(|(at, name)| header[..*at].contains(name));
+        if let Some((_, name)) = twice {
+            let error =
+                Diagnostic::error("E0945", Span::NONE, format!("two columns are called `{name}`"));
+            d.push(error.help("give the measure another name"));
+            return None;
+        }
+        Some(header)
+    }
+
+    fn prepare(
+        &self,
+        settings: &[Setting],
+        map: &mut SourceMap,
+        d: &mut Vec<Diagnostic>,
+    ) -> Option<Run> {
+        let mut overrides: Overrides = self.sweep.overrides.clone();
+        let set = settings.iter().map(|setting| (setting.name.clone(), setting.text.clone()));
+        overrides.set.extend(set);
+        if !self.items.is_empty() {
+            // What is measured stands last, behind the columns of a trace.
+            let own = overrides.observe.take().filter(|_| self.traces.is_some());
+            let items = own.into_iter().chain(self.items.iter().cloned());
+            overrides.observe = Some(items.collect::<Vec<_>>().join(", "));
+        } else if self.traces.is_none() && !self.bond {
+            // The cards of the netlist measure; nobody looks at its columns.
+            overrides.observe = None;
+        }
+        let before = d.len();
+        let mut complete =
+            |circuit: &mut Circuit, d: &mut Vec<Diagnostic>| self.measure(circuit, d);
+        let run = run::prepare_with(map, self.sweep.file, &overrides, None, &mut complete, d)?;
+        if !run.steps.is_empty() {
+            let error =
+                Diagnostic::error("E1202", Span::NONE, "the netlist has a `.step` of its own");
+            d.push(error.help("leave it out, and vary its parameter with --vary"));
+        }
+        (!has_errors(&d[before..])).then_some(run)
+    }
+
+    /// Adds the measures of the sweep to those of a circuit, over the columns that were added last.
+    fn measure(&self, circuit: &mut Circuit, d: &mut Vec<Diagnostic>) {
+        let columns = circuit.outputs.len().saturating_sub(self.items.len());
+        let first = circuit.watched.len();
+        let exprs = circuit.outputs[columns..].iter().map(|Output { expr, .. }| expr.clone());
+        circuit.watched.extend(exprs);
+        let read = |text: &str| super::reading(text, self.bond);
+        for ((wanted, span), place) in self.sweep.measures.iter().zip(&self.places) {
+            match wanted.kind(first + place, &read) {
+                Ok(kind) => {
+                    let (name, analysis) = (wanted.name.clone(), String::new());
+                    circuit.measures.push(Measure { name, span: *span, analysis, kind });
+                }
+                Err(why) => {
+                    d.push(Diagnostic::error("E1203", *span, format!("`{}`: {why}", wanted.name)))
+                }
+            }
+        }
+    }
+
+    /// Makes a run; nothing where it was interrupted.
+    pub fn run(&self, run: u64, map: &SourceMap, stop: &Arc<AtomicBool>) -> Option<Row> {
+        let settings = self.sweep.space.settings(run);
+        let mut map = map.clone();
+        let mut d = vec![];
+        let mut row = Row { run, settings, values: vec![], failure: None };
+        let Some(mut prepared) = self.prepare(&row.settings, &mut map, &mut d) else {
+            let error = d.into_iter().find(|d| d.severity == Severity::Error);
+            row.failure = error.map(Box::new);
+            return Some(row);
+        };
+        prepared.watch(stop.clone(), None);
+        let outcome = self.simulate(run, &prepared);
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        match outcome {
+            Ok(outcomes) => row.values = outcomes.iter().map(|outcome| outcome.value).collect(),
+            Err(why) => row.failure = Some(why),
+        }
+        Some(row)
+    }
+
+    fn simulate(&self, run: u64, prepared: &Run) -> Result<Vec<Outcome>, Box<Diagnostic>> {
+        let file = |error: io::Error, name: &PathBuf| {
+            Box::new(crate::diagnostic::files::unwritable(&name.to_string_lossy(), &error))
+        };
+        let (result, taken) = match &self.traces {
+            None => prepared.go_measured(&mut Nowhere),
+            Some(folder) => {
+                let name = folder.join(format!("run-{run}.csv"));
+                let heading = Heading { title: String::new(), units: false };
+                let to = File::create(&name).map(BufWriter::new).map_err(|e| file(e, &name))?;
+                let rows = csv::Rows::new(to, &heading, &prepared.names, &prepared.units);
+                let mut rows = rows.map_err(|error| file(error, &name))?;
+                let outcome = prepared.go_measured(&mut rows);
+                rows.finish().map_err(|error| file(error, &name))?;
+                outcome
+            }
+        };
+        match result {
+            Ok(_) => Ok(taken.measured.into_iter().flat_map(|one| one.outcomes).collect()),
+            Err(failure) if failure.kind == FailureKind::Interrupted => Ok(vec![]),
+            Err(failure) => Err(failure.diagnostic),
+        }
+    }
+}
+
+/// Where rows go that nobody reads.
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn row(&mut self, _: &[f64]) -> io::Result<()> {
+        Ok(())
+    }
+}
