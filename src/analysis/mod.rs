@@ -19,4 +19,5 @@ pub mod symbolic;
 pub mod paths;
 pub mod resonance;
 pub mod tune;
+pub mod activity;
 pub mod sweep;

@@ -169,6 +169,44 @@ impl SignalLaw {
             SignalLaw::Waveform(_) => None,
         }
     }
+
+    /// Calls `visit` for every expression in it, those of parameters alone, too.
+    pub fn expressions<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
+        self.expression().into_iter().for_each(&mut *visit);
+        match self {
+            SignalLaw::Integrator { initial: Initial::Given(value), .. } => visit(value),
+            SignalLaw::Memory { kind: Memory::Hysteresis { low, high }, .. } => {
+                [low, high].into_iter().for_each(visit);
+            }
+            SignalLaw::Memory {
+                kind: Memory::Sample { period: value } | Memory::Delay { by: value },
+                ..
+            } => visit(value),
+            SignalLaw::Waveform(waveform) => waveform.expressions(visit),
+            SignalLaw::Algebraic(_) | SignalLaw::Integrator { .. } => {}
+        }
+    }
+}
+
+impl Waveform {
+    /// Calls `visit` for every expression in it.
+    pub fn expressions<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
+        match self {
+            Waveform::Step { at, before, after } => [at, before, after].into_iter().for_each(visit),
+            Waveform::Ramp { at, slope } => [at, slope].into_iter().for_each(visit),
+            Waveform::Pulse { low, high, delay, rise, fall, width, period } => {
+                [low, high, delay, rise, fall, width, period].into_iter().for_each(visit);
+            }
+            Waveform::Sine { offset, amplitude, frequency, delay, damping, phase } => {
+                [offset, amplitude, frequency, delay, damping, phase].into_iter().for_each(visit);
+            }
+            Waveform::Pwl(points) => points.iter().for_each(|(t, y)| {
+                visit(t);
+                visit(y);
+            }),
+            Waveform::Noise { seed, rms, dt } => [seed, rms, dt].into_iter().for_each(visit),
+        }
+    }
 }
 
 /// A value at t = 0.

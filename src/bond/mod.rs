@@ -15,5 +15,6 @@ pub mod fields;
 pub mod prepared;
 pub mod initial;
 pub mod scale;
+pub mod transform;
 #[cfg(test)]
 pub(crate) mod build;

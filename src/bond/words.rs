@@ -38,7 +38,11 @@ pub fn letter(power: Power) -> &'static str {
 
 /// What a signal is.
 pub fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
-    let text = |expr: &Expr| expression(graph, expr);
+    signal_law_in(&|expr| expression(graph, expr), law)
+}
+
+/// The same with expressions spelt by `text`.
+pub fn signal_law_in(text: &dyn Fn(&Expr) -> String, law: &SignalLaw) -> String {
     let list = |name: &str, arguments: &[&Expr]| {
         let arguments: Vec<String> = arguments.iter().map(|a| text(a)).collect();
         format!("{name}({})", arguments.join(", "))
@@ -46,7 +50,7 @@ pub fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
     match law {
         SignalLaw::Algebraic(expr) => text(expr),
         SignalLaw::Integrator { rate, initial } => {
-            format!("integ({}, {})", text(rate), initial_value(graph, initial))
+            format!("integ({}, {})", text(rate), initial_value(text, initial))
         }
         SignalLaw::Memory { kind, input } => match kind {
             Memory::Hysteresis { low, high } => {
@@ -76,9 +80,9 @@ pub fn signal_law(graph: &BondGraph, law: &SignalLaw) -> String {
     }
 }
 
-fn initial_value(graph: &BondGraph, initial: &Initial) -> String {
+fn initial_value(text: &dyn Fn(&Expr) -> String, initial: &Initial) -> String {
     match initial {
-        Initial::Given(expr) => expression(graph, expr),
+        Initial::Given(expr) => text(expr),
         Initial::Implied => "implied".into(),
     }
 }
@@ -114,7 +118,7 @@ pub fn law(graph: &BondGraph, law: &Law) -> String {
         }
         Law::Rate { kind, rate, initial } => {
             let gives = letter(kind.gives());
-            format!("der({gives}) = {}, {gives}0 = {}", text(rate), initial_value(graph, initial))
+            format!("der({gives}) = {}, {gives}0 = {}", text(rate), initial_value(&text, initial))
         }
         Law::Field(field) => {
             let ports = field.ports.iter().enumerate();

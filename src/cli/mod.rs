@@ -26,6 +26,8 @@ pub mod bode;
 pub mod tf;
 pub mod paths;
 pub mod tune;
+pub mod transform;
+pub mod reduce;
 pub mod sweep;
 pub mod trace;
 pub mod draw;
@@ -88,6 +90,8 @@ pub const COMMANDS: &[Command] = &[
     command!(tf),
     command!(paths),
     command!(tune),
+    command!(transform),
+    command!(reduce),
     command!(sweep),
     command!(trace),
     command!(draw),

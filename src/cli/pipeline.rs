@@ -182,7 +182,12 @@ pub fn model(
     overrides: &Overrides,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Model> {
-    let mut graph = graph(map, file, overrides, d)?;
+    let graph = graph(map, file, overrides, d)?;
+    model_of(graph, map, d)
+}
+
+/// From a graph to its netlist.
+pub fn model_of(mut graph: BondGraph, map: &SourceMap, d: &mut Vec<Diagnostic>) -> Option<Model> {
     let causality = causality(&graph, d)?;
     elaborate::require_drives(&graph, d);
     set_step(&mut graph, d);

@@ -287,6 +287,13 @@ pub const CODES: &[Code] = &[
     row("E1001", "too large to draw", "Nobody can read a picture of more than 160 junctions and elements. Draw instances as one node each with `--depth 0`, or write a `.dot` file, which Graphviz lays out at any size."),
     row("E1010", "no such column", "A column that is to be plotted has no place in any of the traces. The message names the nearest, or all there are."),
     row("N1001", "instances are not laid open", "The whole graph has too many junctions and elements for one picture, so that instances deeper than a level are drawn as one node each. `--depth` says how deep."),
+    // -- 11: models rewritten
+    row("E1100", "nothing of this name to change", "`bondspice transform` and `reduce` change junctions and elements, named as in the file, those of instances with the instance's name: `valve1.flow`. The message names the nearest."),
+    row("E1101", "change cannot be made", "An element, or a branch that hangs on one bond, moves over a transformer or gyrator of constant ratio when the junction that it hangs on is bonded to the two-port itself. The message says what is otherwise here."),
+    row("E1102", "lines are not each other's mirror", "Two lines become one when every part of one has a mirror in the other: equal laws, linear or odd, and half arrows such that what one takes the other gives. The message names the first pair for which that is not so. Sources and check valves drive both lines alike: leave them out first, and know what that costs."),
+    row("E1103", "reading has no counterpart", "After the change nothing has the value that is read here. Read a neighbour that stays, or leave the reading out."),
+    row("E1104", "part cannot be left out", "An element is left out of a junction that has other bonds, where its effort (on a 1-junction) or its flow (on a 0-junction) counts as 0. What would be left must still be a model."),
+    row("N1106", "instances are laid open", "The change reaches into instances of models, which others of the same model would share. So the new text holds all of them as their parts."),
     // -- 12: sweeps
     row("E1200", "plan is no TOML", "A plan of a sweep is written in TOML: `key = value` lines, tables as `[set]`, texts in quotes."),
     row("E1201", "plan says something else", "A plan has the keys model, runs, seed, set, measures, until, step, observe and options, each with values of its own kind; the message says which are meant."),
@@ -312,6 +319,7 @@ pub const STAGES: &[(u32, u32, &str, u8)] = &[
     (920, 939, "data files", 3),
     (940, 999, "usage", 2),
     (1000, 1099, "drawings and plots", 3),
+    (1100, 1199, "models rewritten", 3),
     (1200, 1299, "sweeps", 3),
 ];
 

@@ -248,6 +248,12 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E1001" "too_large_to_draw.bg"
     "E1010" "column_to_plot.expected"
     "N1001" "instances_closed.bg"
+    "E1100" "nothing_of_this_name.bg"
+    "E1101" "moved_too_far.bg"
+    "E1102" "lines_not_alike.bg"
+    "E1103" "left_out_and_read.bg"
+    "E1104" "all_left_out.bg"
+    "N1106" "laid_open.bg"
 };
 
 macro_rules! beside {

@@ -18,6 +18,8 @@ mod lines;
 mod rows;
 mod linear;
 mod symbolic;
+mod transformed;
+mod reduced;
 mod paths;
 mod second_route;
 mod ngspice;
