@@ -54,14 +54,11 @@ pub struct Arguments {
 }
 
 /// Computes it and writes it.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let (from, to) = (Some(arguments.from.as_str()), Some(arguments.to.as_str()));
     let found = linear::linearise(&arguments.point, from, to, session)?;
     let linear = &found.linear;

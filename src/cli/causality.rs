@@ -18,16 +18,13 @@ effort on b.\n\nExample: bondspice causality model.bg --format json";
 pub type Arguments = ReportFlags;
 
 /// Assigns causality and shows it, conflicts included.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
-    let overrides = arguments.model.overrides(session)?;
-    let file = session.load(&arguments.file)?;
-    pipeline::require_bond(session, file, "asked for its causality")?;
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
+    let (file, overrides) =
+        arguments.model.of(&arguments.file, "asked for its causality", session)?;
     let mut d = vec![];
     let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
     let found = graph.map(|graph| {
@@ -40,6 +37,5 @@ fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         "json" => format!("{}\n", causality::to_json(&graph, &causality)),
         _ => causality::to_text(&graph, &causality),
     };
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }

@@ -32,13 +32,11 @@ pub struct Arguments {
 }
 
 /// Checks.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match check(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn check(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    let arguments = &arguments;
     let mut overrides = arguments.model.overrides(session)?;
     arguments.deck.add_to(&mut overrides, session)?;
     if arguments.fix {

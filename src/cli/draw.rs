@@ -48,13 +48,11 @@ pub struct Arguments {
 }
 
 /// Draws.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match draw(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn draw(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let form = form(arguments, session)?;
     let mut overrides = arguments.model.overrides(session)?;
     arguments.deck.add_to(&mut overrides, session)?;
@@ -82,8 +80,7 @@ fn draw(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
             if form == "tex" { tikz::write(&picture) } else { svg::write(&picture) }
         }
     };
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }
 
 /// Draws the circuit of either language.
@@ -93,7 +90,7 @@ fn circuit(
     file: FileId,
     overrides: &Overrides,
     session: &mut Session,
-) -> Result<Exit, Exit> {
+) -> Result<(), Exit> {
     if form == "dot" {
         let error = Diagnostic::error("E0941", Span::NONE, "a circuit has no form `dot`");
         return Err(session.fail(error.help("end the name in .svg or .tex")));
@@ -115,8 +112,7 @@ fn circuit(
         "tex" => schematic::circuitikz(&placed),
         _ => svg::write(&schematic::paint(&placed)),
     };
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }
 
 /// A flat circuit, and by device whether it is drawn: of a bond graph what carries power, of a netlist everything.

@@ -1,12 +1,13 @@
 //! Flags that several commands share: what to change in a model, and how to run it.
 
+use super::pipeline;
 use super::session::{Exit, Session};
 use crate::bond::elaborate::Overrides;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::dialects::{self, Dialect};
 use crate::netlist::read::How;
 use crate::quantity::nearest;
-use crate::source::Span;
+use crate::source::{FileId, Span};
 
 /// What the command line says instead of the file.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -105,6 +106,22 @@ pub struct ReportFlags {
 }
 
 impl ModelFlags {
+    /// Reads a file that must hold a bond graph, and what is to be changed in it; `what` is to be done with it.
+    ///
+    /// # Errors
+    /// The exit code, when the reason has been said.
+    pub fn of(
+        &self,
+        file: &str,
+        what: &str,
+        session: &mut Session,
+    ) -> Result<(FileId, Overrides), Exit> {
+        let overrides = self.overrides(session)?;
+        let file = session.load(file)?;
+        pipeline::require_bond(session, file, what)?;
+        Ok((file, overrides))
+    }
+
     /// The flags in the words of elaboration.
     ///
     /// # Errors

@@ -27,6 +27,53 @@ pub struct PointFlags {
     pub at: String,
 }
 
+/// Flags of a way from one variable to another.
+#[derive(Clone, Debug, clap::Args)]
+pub struct WayFlags {
+    /// The variable that the way begins at; it is imposed
+    #[arg(long, value_name = "VARIABLE", requires = "to")]
+    from: Option<String>,
+    /// The variable that it leads to
+    #[arg(long, value_name = "EXPR", requires = "from")]
+    to: Option<String>,
+}
+
+impl WayFlags {
+    /// Whether a way is asked for.
+    pub fn given(&self) -> bool {
+        self.from.is_some()
+    }
+
+    /// Linearises a model, with names for the values at its elements or without; of a way one variable stands at each end.
+    ///
+    /// # Errors
+    /// The exit code, when the reason has been said.
+    pub fn linearise(
+        &self,
+        point: &PointFlags,
+        named: bool,
+        session: &mut Session,
+    ) -> Result<Linearised, Exit> {
+        let found = prepare(point, self.from.as_deref(), self.to.as_deref(), named, session)?;
+        if self.given() {
+            one_way(&found.linear, session)?;
+        }
+        Ok(found)
+    }
+}
+
+/// Refuses more than one input or output.
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn one_way(linear: &Linear, session: &mut Session) -> Result<(), Exit> {
+    if linear.inputs.len() == 1 && linear.outputs.len() == 1 {
+        return Ok(());
+    }
+    let message = "--from and --to take one variable each";
+    Err(session.fail(Diagnostic::error("E0940", Span::NONE, message)))
+}
+
 /// A model with its linear one.
 pub struct Linearised {
     /// The graph.
@@ -71,9 +118,7 @@ fn prepare(
     session: &mut Session,
 ) -> Result<Linearised, Exit> {
     let at = at(&flags.at, session)?;
-    let mut overrides = flags.model.overrides(session)?;
-    let file = session.load(&flags.file)?;
-    pipeline::require_bond(session, file, "linearised")?;
+    let (file, mut overrides) = flags.model.of(&flags.file, "linearised", session)?;
     let inputs = inputs.map(|list| variables(session, file, &overrides, list)).transpose()?;
     if let Some(list) = outputs {
         overrides.observe = Some(list.to_string());
@@ -93,9 +138,7 @@ fn prepare(
 /// The exit code, when the reason has been said.
 pub fn tuned(flags: &PointFlags, session: &mut Session) -> Result<(Vec<Tuned>, Vec<String>), Exit> {
     let at = at(&flags.at, session)?;
-    let overrides = flags.model.overrides(session)?;
-    let file = session.load(&flags.file)?;
-    pipeline::require_bond(session, file, "tuned")?;
+    let (file, overrides) = flags.model.of(&flags.file, "tuned", session)?;
     let mut d = vec![];
     let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
     let found = graph.and_then(|graph| {

@@ -43,14 +43,11 @@ pub struct Arguments {
 }
 
 /// Linearises and shows.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let (inputs, outputs) = (arguments.from.as_deref(), arguments.to.as_deref());
     let found = linear::linearise(&arguments.point, inputs, outputs, session)?;
     let space = state_space(&found.linear).map_err(|error| session.fail(*error))?;

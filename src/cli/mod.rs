@@ -60,6 +60,36 @@ pub struct Command {
     pub run: fn(&clap::ArgMatches, &mut Session) -> Result<Exit, clap::Error>,
 }
 
+/// How a command ends.
+trait Ending {
+    /// The exit code.
+    fn exit(self, session: &Session) -> Exit;
+}
+
+impl Ending for Exit {
+    fn exit(self, _: &Session) -> Exit {
+        self
+    }
+}
+
+/// Done, as far as what has been said allows; or why not, which has been said.
+impl Ending for Result<(), Exit> {
+    fn exit(self, session: &Session) -> Exit {
+        match self {
+            Ok(()) => session.exit(),
+            Err(exit) => exit,
+        }
+    }
+}
+
+impl Ending for Result<Exit, Exit> {
+    fn exit(self, _: &Session) -> Exit {
+        match self {
+            Ok(exit) | Err(exit) => exit,
+        }
+    }
+}
+
 macro_rules! command {
     ($module:ident) => {
         Command {
@@ -70,7 +100,8 @@ macro_rules! command {
                     .after_help($module::EXAMPLE)
             },
             run: |matches, session| {
-                Ok($module::run($module::Arguments::from_arg_matches(matches)?, session))
+                let arguments = $module::Arguments::from_arg_matches(matches)?;
+                Ok($module::run(arguments, session).exit(session))
             },
         }
     };

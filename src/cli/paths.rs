@@ -1,8 +1,7 @@
 //! `bondspice paths MODEL.bg`: causal paths and loops with their gains, and what resonates.
 
-use super::linear::{self, PointFlags};
+use super::linear::{PointFlags, WayFlags};
 use super::output::write_text;
-use super::poles::one_way;
 use super::session::{Exit, Session};
 use super::table::{Table, short};
 use crate::analysis::linear::Linear;
@@ -30,12 +29,8 @@ Example: bondspice paths models/rlc.bg
 pub struct Arguments {
     #[command(flatten)]
     point: PointFlags,
-    /// The variable that paths begin at; it is imposed
-    #[arg(long, value_name = "VARIABLE", requires = "to")]
-    from: Option<String>,
-    /// The variable that they lead to
-    #[arg(long, value_name = "EXPR", requires = "from")]
-    to: Option<String>,
+    #[command(flatten)]
+    way: WayFlags,
     /// Form of the result
     #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
     format: String,
@@ -48,29 +43,15 @@ pub struct Arguments {
 const LONGEST: usize = 100;
 
 /// Finds them and shows them.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-struct Found {
-    paths: Option<Vec<Way>>,
-    loops: Vec<Way>,
-    flow: Flow,
-    resonances: Vec<Resonance>,
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
-    let (from, to) = (arguments.from.as_deref(), arguments.to.as_deref());
-    let named = linear::linearise_named(&arguments.point, from, to, session)?;
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
+    let named = arguments.way.linearise(&arguments.point, true, session)?;
     let (graph, linear) = (&named.graph, &named.linear);
-    if from.is_some() {
-        one_way(linear, session)?;
-    }
     let states = (0..linear.states).filter(|k| linear.stores(*k)).count();
-    let found = find(graph, linear, from.is_some());
+    let found = find(graph, linear, arguments.way.given());
     let found = found.map_err(|trouble| session.fail(*transfer::explain(trouble, states)))?;
     if found.paths.as_ref().is_some_and(Vec::is_empty) {
         let (from, to) = (&linear.inputs[0].name, &linear.outputs[0].name);
@@ -87,6 +68,13 @@ fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         _ => to_text(graph, linear, &found),
     };
     write_text(arguments.output.as_deref(), &text, session)
+}
+
+struct Found {
+    paths: Option<Vec<Way>>,
+    loops: Vec<Way>,
+    flow: Flow,
+    resonances: Vec<Resonance>,
 }
 
 fn find(

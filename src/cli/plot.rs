@@ -57,13 +57,11 @@ pub struct Arguments {
 }
 
 /// Plots.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match plot_files(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn plot_files(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let form = form(arguments.output.as_deref(), session)?;
     if arguments.traces.iter().filter(|name| *name == "-").count() > 1 {
         let message = "only one of the traces can be standard input";
@@ -91,7 +89,7 @@ fn plot_files(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit
         arguments.output.as_deref(),
         session,
     )?;
-    Ok(session.exit())
+    Ok(())
 }
 
 /// The form of a plot by the ending of its file.

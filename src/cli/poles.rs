@@ -1,16 +1,14 @@
 //! `bondspice poles MODEL.bg`: poles with frequency, damping and the storages that take part; zeros.
 
-use super::linear::{self, PointFlags};
+use super::linear::{PointFlags, WayFlags};
 use super::output::write_text;
 use super::session::{Exit, Session};
 use super::table::{Table, short};
 use crate::analysis::export;
 use crate::analysis::linear::Linear;
 use crate::analysis::poles::{Pole, poles, zeros};
-use crate::diagnostic::Diagnostic;
 use crate::linear::Complex;
 use crate::linear::roots::Root;
-use crate::source::Span;
 
 /// What it does, in a line.
 pub const ABOUT: &str =
@@ -29,12 +27,8 @@ Example: bondspice poles models/eha_one_line.bg --at 2s
 pub struct Arguments {
     #[command(flatten)]
     point: PointFlags,
-    /// The variable that is imposed, for zeros
-    #[arg(long, value_name = "VARIABLE", requires = "to")]
-    from: Option<String>,
-    /// The variable that is read, for zeros
-    #[arg(long, value_name = "EXPR", requires = "from")]
-    to: Option<String>,
+    #[command(flatten)]
+    way: WayFlags,
     /// Form of the result
     #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
     format: String,
@@ -44,42 +38,23 @@ pub struct Arguments {
 }
 
 /// Finds them and shows them.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
-    let (from, to) = (arguments.from.as_deref(), arguments.to.as_deref());
-    let found = linear::linearise(&arguments.point, from, to, session)?;
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
+    let found = arguments.way.linearise(&arguments.point, false, session)?;
     let linear = &found.linear;
     let poles = poles(linear).map_err(|error| session.fail(*error))?;
-    let zeros = match from {
-        Some(_) => {
-            one_way(linear, session)?;
-            Some(zeros(linear, 0, 0).map_err(|error| session.fail(*error))?)
-        }
-        None => None,
+    let zeros = match arguments.way.given() {
+        true => Some(zeros(linear, 0, 0).map_err(|error| session.fail(*error))?),
+        false => None,
     };
     let text = match arguments.format.as_str() {
         "json" => format!("{:#}\n", export::poles_to_json(linear, &poles, zeros.as_deref())),
         _ => to_text(linear, &poles, zeros.as_deref()),
     };
     write_text(arguments.output.as_deref(), &text, session)
-}
-
-/// Refuses more than one input or output.
-///
-/// # Errors
-/// The exit code, when the reason has been said.
-pub fn one_way(linear: &Linear, session: &mut Session) -> Result<(), Exit> {
-    if linear.inputs.len() == 1 && linear.outputs.len() == 1 {
-        return Ok(());
-    }
-    let message = "--from and --to take one variable each";
-    Err(session.fail(Diagnostic::error("E0940", Span::NONE, message)))
 }
 
 fn place(at: Complex) -> String {

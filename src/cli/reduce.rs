@@ -51,33 +51,17 @@ pub struct Arguments {
 }
 
 /// Measures, reduces, and shows.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match reduce(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-/// A model with fewer elements, and what that costs.
-struct Reduced {
-    keep: f64,
-    text: String,
-    /// Elements left out, and those that would be, and why they stay.
-    out: Vec<String>,
-    stay: Vec<(String, String)>,
-    /// By column, in parts of its range.
-    errors: Vec<(String, f64)>,
-}
-
-fn reduce(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let keeps = keeps(&arguments.keep, session)?;
     if arguments.output.is_some() && keeps.len() > 1 {
         let message = "-o writes one model: give --keep one number";
         return Err(session.fail(Diagnostic::error("E0940", Span::NONE, message)));
     }
-    let overrides = arguments.model.overrides(session)?;
-    let file = session.load(&arguments.file)?;
-    pipeline::require_bond(session, file, "reduced")?;
+    let (file, overrides) = arguments.model.of(&arguments.file, "reduced", session)?;
     let mut d = vec![];
     let graph = pipeline::graph(&mut session.map, file, &overrides, &mut d);
     session.say(d);
@@ -97,6 +81,17 @@ fn reduce(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
         _ => to_text(&graph, &activities, &all, trace.time().last().copied().unwrap_or(0.0)),
     };
     write_text(None, &text, session)
+}
+
+/// A model with fewer elements, and what that costs.
+struct Reduced {
+    keep: f64,
+    text: String,
+    /// Elements left out, and those that would be, and why they stay.
+    out: Vec<String>,
+    stay: Vec<(String, String)>,
+    /// By column, in parts of its range.
+    errors: Vec<(String, f64)>,
 }
 
 fn keeps(texts: &[String], session: &mut Session) -> Result<Vec<f64>, Exit> {

@@ -45,16 +45,12 @@ pub struct Arguments {
 }
 
 /// Writes the page.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match page(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn page(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
-    let overrides = arguments.model.overrides(session)?;
-    let file = session.load(&arguments.file)?;
-    pipeline::require_bond(session, file, "reported on")?;
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
+    let (file, overrides) = arguments.model.of(&arguments.file, "reported on", session)?;
     let mut d = vec![];
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     session.say(d);
@@ -95,8 +91,7 @@ fn page(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         cards: &cards,
         warnings: &warnings,
     });
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }
 
 /// The run, all of it in memory.

@@ -68,13 +68,11 @@ pub struct Arguments {
 }
 
 /// Simulates.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match simulate(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn simulate(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    let arguments = &arguments;
     let mut overrides = arguments.model.overrides(session)?;
     arguments.deck.add_to(&mut overrides, session)?;
     let file = session.load(&arguments.file)?;

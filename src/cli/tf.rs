@@ -1,8 +1,7 @@
 //! `bondspice tf MODEL.bg --from A --to B`: a transfer function in the model's own parameters.
 
-use super::linear::{self, PointFlags};
+use super::linear::{self, PointFlags, one_way};
 use super::output::write_text;
-use super::poles::one_way;
 use super::session::{Exit, Session};
 use super::table::short;
 use crate::analysis::symbolic::{print, transfer::transfer};
@@ -39,14 +38,11 @@ pub struct Arguments {
 }
 
 /// Makes it and shows it.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let (from, to) = (Some(arguments.from.as_str()), Some(arguments.to.as_str()));
     let found = linear::linearise_named(&arguments.point, from, to, session)?;
     one_way(&found.linear, session)?;

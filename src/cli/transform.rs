@@ -54,13 +54,11 @@ pub struct Arguments {
 }
 
 /// Changes the model and writes it.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match change(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn change(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let named = arguments.drop.len() + arguments.lump.len() + arguments.moves.len();
     if named == 0 && !arguments.flatten && !arguments.simplify {
         let error = Diagnostic::error("E0940", Span::NONE, "nothing is said to be changed");
@@ -86,8 +84,7 @@ fn change(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         let note = Diagnostic::note("N1106", Span::NONE, message);
         session.say([note.help("elements are named `motor_rotor` for `motor.rotor` now")]);
     }
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }
 
 fn steps(arguments: &Arguments, work: &mut Work) -> Result<(), Trouble> {

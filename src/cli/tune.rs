@@ -33,21 +33,18 @@ pub struct Arguments {
 }
 
 /// Designs and shows.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
+    let arguments = &arguments;
     let (tuned, left_out) = super::linear::tuned(&arguments.point, session)?;
     let text = match arguments.format.as_str() {
         "json" => format!("{:#}\n", to_json(&tuned, &left_out)),
         "flags" => flags(&tuned) + "\n",
         _ => to_text(&tuned, &left_out),
     };
-    write_text(arguments.output.as_deref(), &text, session)?;
-    Ok(session.exit())
+    write_text(arguments.output.as_deref(), &text, session)
 }
 
 fn flags(tuned: &[Tuned]) -> String {

@@ -51,13 +51,11 @@ pub struct Arguments {
 }
 
 /// Verifies.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match verify(&arguments, session) {
-        Ok(exit) | Err(exit) => exit,
-    }
-}
-
-fn verify(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<Exit, Exit> {
+    let arguments = &arguments;
     let flags = &arguments.report;
     let mut overrides = flags.model.overrides(session)?;
     arguments.deck.add_to(&mut overrides, session)?;

@@ -264,7 +264,7 @@ impl Writer<'_> {
                 let arguments = arguments.iter().map(|a| self.pieces(a, true)).collect();
                 Node::Call(*function, arguments)
             }
-            Node::If(c, a, b) => Node::If(part(c), part(a), part(b)),
+            Node::If(c, a, b) => Node::choice(part(c), part(a), part(b)),
             Node::Table(a, table) => Node::Table(self.pieces(a, true), table.clone()),
         };
         Tree::new(node, expr.span)
