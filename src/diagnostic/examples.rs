@@ -254,6 +254,13 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E1103" "left_out_and_read.bg"
     "E1104" "all_left_out.bg"
     "N1106" "laid_open.bg"
+    "E1200" "sweep_plan_no_toml.expected"
+    "E1201" "sweep_plan_other_keys.expected"
+    "E1202" "sweep_of_steps.expected"
+    "E1203" "sweep_without_measure.expected"
+    "E1204" "sweep_parts_overlap.expected"
+    "W1200" "sweep_runs_fail.expected"
+    "W1201" "sweep_part_missing.expected"
 };
 
 macro_rules! beside {

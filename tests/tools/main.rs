@@ -10,6 +10,7 @@ mod docs;
 mod editors;
 mod drawings;
 mod report;
+mod sweep;
 mod gallery;
 mod codes;
 mod architecture;

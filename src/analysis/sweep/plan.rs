@@ -59,10 +59,19 @@ pub fn read(map: &SourceMap, file: FileId, d: &mut Vec<Diagnostic>) -> Plan {
         start: range.start as u32,
         end: range.end as u32,
     };
+    // What follows an error in its line is a consequence of it.
+    let mut line = 0;
     for error in &errors {
         let span = place(error.span().unwrap_or(0..0));
-        let message = format!("this is no TOML: {}", error.message().replace('\n', "; "));
-        d.push(Diagnostic::error("E1200", span, message));
+        let own = map.position(span).map_or(0, |(line, _)| line);
+        if own != line {
+            let message = format!("this is no TOML: {}", error.message().replace('\n', "; "));
+            d.push(Diagnostic::error("E1200", span, message));
+        }
+        line = own;
+    }
+    if !errors.is_empty() {
+        return Plan::default();
     }
     let mut reader = Reader { place: &place, d };
     let mut plan = Plan::default();
@@ -300,6 +309,7 @@ mod tests {
                 ("E1203", "\"maxx(v)\"")
             ]
         );
-        assert_eq!(plan("a = = 2\n").1[0].code, "E1200");
+        let codes = |text: &str| plan(text).1.iter().map(|d| d.code).collect::<Vec<_>>();
+        assert_eq!(codes("a = = 2\nb = = 3\n"), ["E1200", "E1200"]);
     }
 }
