@@ -391,12 +391,15 @@ impl<'a> Run<'a> {
             if self.fresh && !self.smoothed && h < LAYER * remaining {
                 // A layer this thin (a junction's capacitance behind its series resistance) is beyond resolving.
                 self.smoothed = true;
-                if let Err(failure) = self.redistribute(Moment::Restart) {
-                    if !self.step_over(LAYER * remaining) {
-                        return Err(failure);
+                match self.redistribute(Moment::Restart) {
+                    Ok(()) => self.settle(LAYER * remaining),
+                    Err(failure) => {
+                        if !self.step_over(LAYER * remaining) {
+                            return Err(failure);
+                        }
                     }
-                    remaining = corner - self.state.t;
                 }
+                remaining = corner - self.state.t;
                 self.weigh();
                 self.work.linearised = false;
                 h = 1e-6 * remaining;
