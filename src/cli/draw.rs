@@ -10,7 +10,7 @@ use crate::bond::graph::BondGraph;
 use crate::circuit::{Circuit, NodeId};
 use crate::diagnostic::Diagnostic;
 use crate::draw::bond_graph::{self, MOST, Sketch};
-use crate::draw::{schematic, svg, tikz};
+use crate::draw::{schematic, svg};
 use crate::source::{FileId, Span};
 use std::collections::HashSet;
 
@@ -77,7 +77,7 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
             let sketch = fitting(&graph, &causality, arguments.depth, session)?;
             let placed = bond_graph::place(&sketch);
             let picture = bond_graph::paint(&graph, &sketch, &placed);
-            if form == "tex" { tikz::write(&picture) } else { svg::write(&picture) }
+            super::plot::text(&picture, form)
         }
     };
     write_text(arguments.output.as_deref(), &text, session)

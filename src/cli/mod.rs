@@ -29,6 +29,7 @@ pub mod tune;
 pub mod transform;
 pub mod reduce;
 pub mod sweep;
+pub mod energy;
 pub mod trace;
 pub mod draw;
 pub mod plot;
@@ -124,6 +125,7 @@ pub const COMMANDS: &[Command] = &[
     command!(transform),
     command!(reduce),
     command!(sweep),
+    command!(energy),
     command!(trace),
     command!(draw),
     command!(plot),

@@ -4,6 +4,7 @@ use super::compare::names;
 use super::output::write_text;
 use super::session::{Exit, Session};
 use crate::diagnostic::Diagnostic;
+use crate::draw::picture::Picture;
 use crate::draw::plot::{self, Choice, Kind, Panel, Source};
 use crate::draw::{svg, tikz};
 use crate::quantity::nearest;
@@ -124,10 +125,14 @@ pub fn show(
         let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
         plot::terminal(panels, columns.unwrap_or(80), 10)
     } else {
-        let picture = plot::paint(title, panels);
-        if form == "tex" { tikz::write(&picture) } else { svg::write(&picture) }
+        text(&plot::paint(title, panels), form)
     };
     write_text(output, &text, session)
+}
+
+/// A picture in a form.
+pub fn text(picture: &Picture, form: &str) -> String {
+    if form == "tex" { tikz::write(picture) } else { svg::write(picture) }
 }
 
 /// The name of a file without folder and ending, unless another has the same.

@@ -2,11 +2,13 @@
 
 use super::linear::{PointFlags, WayFlags};
 use super::output::write_text;
+use super::plot;
 use super::session::{Exit, Session};
 use super::table::{Table, short};
 use crate::analysis::export;
 use crate::analysis::linear::Linear;
 use crate::analysis::poles::{Pole, poles, zeros};
+use crate::draw::plot::{self as draw, Panel};
 use crate::linear::Complex;
 use crate::linear::roots::Root;
 
@@ -20,7 +22,8 @@ What part a storage has in a pole is told in parts of 1 (participation factors).
 to --to; imposing a variable with --from puts aside what determines it otherwise, and so moves the poles, too.
 
 Example: bondspice poles models/eha_one_line.bg --at 2s
-         bondspice poles models/rlc.bg --from 'e(U)' --to 'f(mesh)'";
+         bondspice poles models/rlc.bg --from 'e(U)' --to 'f(mesh)'
+         bondspice poles models/eha_one_line.bg --from x_ref --to x --plot poles.svg";
 
 /// Its flags.
 #[derive(clap::Args)]
@@ -32,6 +35,9 @@ pub struct Arguments {
     /// Form of the result
     #[arg(long, value_name = "FORM", value_parser = ["text", "json"], default_value = "text")]
     format: String,
+    /// Where to draw poles and zeros in the plane of s: .svg or .tex
+    #[arg(long, value_name = "FILE")]
+    plot: Option<String>,
     /// Where to write the result
     #[arg(short, long, value_name = "FILE")]
     output: Option<String>,
@@ -50,11 +56,36 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
         true => Some(zeros(linear, 0, 0).map_err(|error| session.fail(*error))?),
         false => None,
     };
+    if let Some(name) = &arguments.plot {
+        let form = plot::form(Some(name), session)?;
+        let title = format!("{}: poles{}", linear.name, zeros.as_ref().map_or("", |_| " and zeros"));
+        plot::show(&title, &map(linear, &poles, zeros.as_deref()), form, Some(name), session)?;
+    }
     let text = match arguments.format.as_str() {
         "json" => format!("{:#}\n", export::poles_to_json(linear, &poles, zeros.as_deref())),
         _ => to_text(linear, &poles, zeros.as_deref()),
     };
     write_text(arguments.output.as_deref(), &text, session)
+}
+
+/// Poles and zeros as a picture; a pole is called by the storage that takes the greatest part in it.
+fn map(linear: &Linear, poles: &[Pole], zeros: Option<&[Root]>) -> Vec<Panel> {
+    let times = |name: &str, count: usize| match count {
+        1 => name.to_string(),
+        count => format!("{name} ×{count}").trim_start().to_string(),
+    };
+    let pole = |pole: &Pole| {
+        let first = pole.parts.first().map(|(k, _)| linear.unknowns[*k].name.as_str());
+        let name = times(first.unwrap_or(""), pole.multiplicity);
+        draw::Root { at: (pole.at.re, pole.at.im), name }
+    };
+    let zero = |zero: &Root| {
+        let name = if zero.at.im < 0.0 { String::new() } else { times("", zero.multiplicity) };
+        draw::Root { at: (zero.at.re, zero.at.im), name }
+    };
+    let poles: Vec<draw::Root> = poles.iter().map(pole).collect();
+    let zeros: Vec<draw::Root> = zeros.unwrap_or(&[]).iter().map(zero).collect();
+    draw::roots(&poles, &zeros)
 }
 
 fn place(at: Complex) -> String {

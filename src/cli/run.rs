@@ -75,9 +75,7 @@ pub fn prepare_with(
         let (mut circuit, units) = pipeline::circuit(map, file, overrides, d)?;
         complete(&mut circuit, d);
         if circuit.analyses.is_empty() {
-            let message = "nothing says until when to simulate";
-            let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
-            d.push(Diagnostic::error("E0806", Span::NONE, message).help(help));
+            d.push(endless());
             return None;
         }
         return ready(circuit, &units, true, pick, d);
@@ -97,6 +95,13 @@ pub fn prepare_with(
     let mut run = ready(circuit, &deck.units, false, pick, d)?;
     run.deck = Some(deck);
     Some(run)
+}
+
+/// That nothing says until when to simulate.
+pub fn endless() -> Diagnostic {
+    let message = "nothing says until when to simulate";
+    let help = "add `simulate until 1 s step 1 ms` to the file, or --until and --step";
+    Diagnostic::error("E0806", Span::NONE, message).help(help)
 }
 
 /// Names and values of a step.

@@ -286,6 +286,7 @@ pub const CODES: &[Code] = &[
     // -- 10: drawings, plots
     row("E1001", "too large to draw", "Nobody can read a picture of more than 160 junctions and elements. Draw instances as one node each with `--depth 0`, or write a `.dot` file, which Graphviz lays out at any size."),
     row("E1010", "no such column", "A column that is to be plotted has no place in any of the traces. The message names the nearest, or all there are."),
+    row("E1011", "no power to tell of", "Energy is told of elements whose bonds carry power: effort times flow in watts. Temperature and heat flow, or pressure and mass flow, do not multiply to a power."),
     row("N1001", "instances are not laid open", "The whole graph has too many junctions and elements for one picture, so that instances deeper than a level are drawn as one node each. `--depth` says how deep."),
     // -- 11: models rewritten
     row("E1100", "nothing of this name to change", "`bondspice transform` and `reduce` change junctions and elements, named as in the file, those of instances with the instance's name: `valve1.flow`. The message names the nearest."),

@@ -247,6 +247,7 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "N0947" "step_chosen.bg"
     "E1001" "too_large_to_draw.bg"
     "E1010" "column_to_plot.expected"
+    "E1011" "no_power.bg"
     "N1001" "instances_closed.bg"
     "E1100" "nothing_of_this_name.bg"
     "E1101" "moved_too_far.bg"

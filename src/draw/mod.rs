@@ -10,4 +10,5 @@ pub mod tikz;
 pub mod grid;
 pub mod bond_graph;
 pub mod plot;
+pub mod balance;
 pub mod schematic;

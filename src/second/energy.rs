@@ -25,6 +25,18 @@ pub enum Role {
     Modulated,
 }
 
+impl Role {
+    /// Its name in tables and JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Source => "in",
+            Role::Dissipated => "dissipated",
+            Role::Stored => "stored",
+            Role::Modulated => "modulated",
+        }
+    }
+}
+
 /// One element's part, joules; what a source delivers, what others take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Share {
@@ -116,7 +128,7 @@ pub fn balance(
 }
 
 /// What an element does with energy; `None` for junctions and two-ports, which pass it on.
-fn role(graph: &BondGraph, id: VertexId) -> Option<Role> {
+pub fn role(graph: &BondGraph, id: VertexId) -> Option<Role> {
     match &graph.vertex(id).law {
         Law::Zero | Law::One | Law::Transformer(_) | Law::Gyrator(_) => None,
         Law::Source { .. } => Some(Role::Source),
@@ -143,8 +155,24 @@ fn own_only(law: &crate::bond::graph::Expr) -> bool {
     own
 }
 
+/// Whether the law of a store has a value where nothing is stored.
+pub fn has_zero(graph: &BondGraph, id: VertexId) -> bool {
+    let at_zero = |law: &Law| {
+        let Law::Store { law, .. } = law else { return true };
+        let value = store_law(law).evaluate(&mut |leaf| match leaf {
+            Leaf::Parameter(id) => graph.parameters[id.index()].value,
+            _ => 0.0,
+        });
+        value.is_finite()
+    };
+    match &graph.vertex(id).law {
+        Law::Field(field) => field.matrix.is_some() || field.ports.iter().all(at_zero),
+        law => at_zero(law),
+    }
+}
+
 /// E(end) − E(start) of a store whose law is a state function.
-fn gained(
+pub fn gained(
     graph: &BondGraph,
     equations: &Equations,
     id: VertexId,

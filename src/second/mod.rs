@@ -6,6 +6,7 @@
 
 pub mod energy;
 pub mod events;
+pub mod flows;
 mod memories;
 pub mod radau;
 mod rounding;
@@ -20,6 +21,7 @@ use crate::bond::prepared::{self, Prepared};
 use crate::diagnostic::Diagnostic;
 use energy::{Energy, Meter};
 use events::Conditions;
+use flows::{Flow, Flows};
 use memories::Memories;
 use radau::{B, Radau, Statistics, Step, Stop, Verdict};
 use rounding::Rounding;
@@ -31,11 +33,13 @@ pub struct Settings {
     pub tolerance: f64,
     /// Attempted steps after which a run is given up.
     pub maximum_steps: usize,
+    /// Whether the power and energy of every element are kept for every row.
+    pub flows: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { tolerance: 1e-9, maximum_steps: 20_000_000 }
+        Settings { tolerance: 1e-9, maximum_steps: 20_000_000, flows: false }
     }
 }
 
@@ -50,6 +54,8 @@ pub struct Run {
     pub least: Vec<f64>,
     /// The balance of energy over the run.
     pub energy: Energy,
+    /// What flows where at every row, where it was asked for.
+    pub flows: Vec<Flow>,
     /// Of the second, fine run.
     pub statistics: Statistics,
     /// The corners within the run, seconds.
@@ -97,6 +103,12 @@ pub fn integrate(
         ..Run::default()
     };
     let mut meter = Meter::new(graph, &prepared.equations);
+    let mut flows = match settings.flows {
+        true => Flows::new(graph, &prepared.equations, &start),
+        false => Flows::default(),
+    };
+    // Where each unknown stands does not change while the equations are at work.
+    let places = prepared.equations.clone();
     let mut end = start.clone();
     let mut failed = None;
     let mut sizes = Sizes::new(graph, &prepared, &start);
@@ -131,6 +143,7 @@ pub fn integrate(
                                 row.copy_from_slice(step.start);
                             }
                             meter.check(&row);
+                            flows.row(graph, &places, step, times[next], &row);
                             run.columns[0].push(times[next]);
                             let values = readings.read(times[next], 0.5 * (from + to), &row);
                             for ((column, value), factor) in
@@ -140,6 +153,7 @@ pub fn integrate(
                             }
                             next += 1;
                         }
+                        flows.pass(step);
                     }
                     Event::Jump { from, to, equations } => meter.jump(graph, equations, from, to),
                     Event::End(y) => end.copy_from_slice(y),
@@ -170,6 +184,7 @@ pub fn integrate(
     }
     run.energy = energy::balance(graph, &prepared.equations, &meter, &start, &end);
     run.energy.junctions = meter.worst(graph);
+    run.flows = flows.elements;
     run.end = end;
     Some(run)
 }

@@ -2,7 +2,7 @@
 
 use super::certificate::Certificate;
 use super::exact::text::Text;
-use crate::second::energy::{Energy, Role};
+use crate::second::energy::Energy;
 use crate::source::Span;
 use serde::Serialize;
 use std::fmt::Write;
@@ -409,12 +409,7 @@ impl EnergyReport {
                 .iter()
                 .map(|share| ElementEnergy {
                     name: share.name.clone(),
-                    role: match share.role {
-                        Role::Source => "in",
-                        Role::Dissipated => "dissipated",
-                        Role::Stored => "stored",
-                        Role::Modulated => "modulated",
-                    },
+                    role: share.role.name(),
                     energy: share.energy,
                 })
                 .collect(),

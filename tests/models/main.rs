@@ -17,6 +17,7 @@ mod signals;
 mod lines;
 mod rows;
 mod linear;
+mod energy;
 mod symbolic;
 mod transformed;
 mod reduced;

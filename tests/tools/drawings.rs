@@ -16,6 +16,7 @@ use bondspice::source::{SourceMap, loader};
 use bondspice::trace::{Trace, formats};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::process::Command;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -263,6 +264,28 @@ fn nearly_holds(name: &str, drawn: &str, stale: &mut Vec<String>) {
     if words != own || !near {
         holds(name, drawn, stale);
     }
+}
+
+/// What a command draws: its arguments, and the flag that takes the name of the picture.
+fn drawn_by(arguments: &[&str], flag: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("picture.svg");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bondspice"));
+    let output = command.current_dir(root()).args(arguments).arg(flag).arg(&file).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    std::fs::read_to_string(file).unwrap()
+}
+
+#[test]
+fn plots_of_the_documentation_are_drawn_as_it_says() {
+    let mut stale = vec![];
+    let arguments = ["poles", "models/eha_one_line.bg", "--from", "x_ref", "--to", "x"];
+    nearly_holds("poles.svg", &drawn_by(&arguments, "--plot"), &mut stale);
+    let energy = ["energy", "models/drive_train.bg", "-q", "-o", "/dev/null"];
+    nearly_holds("energy.svg", &drawn_by(&energy, "--plot"), &mut stale);
+    nearly_holds("balance.svg", &drawn_by(&energy, "--sankey"), &mut stale);
+    assert!(stale.is_empty(), "not as drawn today (BONDSPICE_REWRITE=1 rewrites): {stale:?}");
 }
 
 /// Figures 16, 17 and 18 of the paper, with its ticks, for the actuator with one line: our run of its netlist, and the

@@ -84,7 +84,7 @@ impl Ruler {
 }
 
 /// 1, 2 or 5 times a power of ten, at least as much as is asked for.
-fn nice(least: f64) -> f64 {
+pub(super) fn nice(least: f64) -> f64 {
     let power = libm::pow(10.0, libm::log10(least).floor());
     let part = least / power;
     let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| part <= *f * (1.0 + 1e-9));

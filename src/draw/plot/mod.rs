@@ -2,13 +2,18 @@
 
 mod axis;
 mod panels;
+mod marks;
+mod roots;
+mod flows;
 mod terminal;
 mod traces;
 #[cfg(test)]
 mod tests;
 
 pub use axis::{Axis, Scale, ticks};
+pub use flows::flows;
 pub use panels::paint;
+pub use roots::{Root, roots};
 pub use terminal::write as terminal;
 pub use traces::{Choice, Kind, Missing, Source, compared, panels};
 
@@ -55,6 +60,10 @@ pub struct Panel {
     pub bands: Vec<Band>,
     /// Single points, marked by a small cross or circle as their name says.
     pub marks: Vec<Mark>,
+    /// What the legend says of marks: each kind once, with its name, wherever it lies.
+    pub keys: Vec<Mark>,
+    /// Lines below everything that help to read.
+    pub guides: Vec<Guide>,
     /// Whether a unit is as long along both axes.
     pub equal: bool,
 }
@@ -68,4 +77,17 @@ pub struct Mark {
     pub ink: Ink,
     /// A cross; else a circle.
     pub cross: bool,
+    /// What is written beside it, where there is room.
+    pub name: String,
+}
+
+/// A thin line that helps to read.
+#[derive(Clone, Debug)]
+pub struct Guide {
+    /// Its points.
+    pub points: Vec<Point>,
+    /// What is written where it ends or leaves the frame, where there is room.
+    pub name: String,
+    /// Whether it is drawn as an axis.
+    pub strong: bool,
 }

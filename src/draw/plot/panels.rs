@@ -1,9 +1,9 @@
 //! Panels as a picture: frames, grids, ticks, legends, curves with no more points than can be seen.
 
-use super::super::picture::{Anchor, Ink, Picture, Point, Shape, Stroke, Words};
+use super::super::picture::{Anchor, Ink, Picture, Point, Room, Shape, Stroke, Words};
 use super::super::text;
 use super::axis::Ruler;
-use super::{Curve, Panel};
+use super::{Curve, Panel, marks};
 
 /// The width of a panel's frame and its height; of one with equal axes.
 const FRAME: (f64, f64) = (720.0, 190.0);
@@ -92,6 +92,9 @@ fn panel(
         words.anchor = Anchor::End;
         picture.words(words);
     }
+    let frame = Room { left, top: y, right: left + wide, bottom: y + high };
+    let mut taken = vec![];
+    marks::guides(panel, &at, frame, &mut taken, picture);
     for band in &panel.bands {
         let inside = |p: &Point| (p.0, p.1.clamp(-1e300, 1e300));
         let mut points: Vec<Point> = band.edges[0].iter().map(|p| at(&inside(p))).collect();
@@ -112,21 +115,7 @@ fn panel(
             picture.path(piece, stroke);
         }
     }
-    for mark in &panel.marks {
-        let (u, v) = at(&mark.at);
-        let stroke = Stroke::new(mark.ink, 1.5);
-        if mark.cross {
-            picture.line((u - 4.0, v - 4.0), (u + 4.0, v + 4.0), stroke);
-            picture.line((u - 4.0, v + 4.0), (u + 4.0, v - 4.0), stroke);
-        } else {
-            picture.shapes.push(Shape::Circle {
-                at: (u, v),
-                radius: 4.0,
-                fill: None,
-                stroke: Some(stroke),
-            });
-        }
-    }
+    marks::marks(panel, &at, frame, &mut taken, picture);
     let corners = vec![(left, y), (left + wide, y), (left + wide, y + high), (left, y + high)];
     let stroke = Some(Stroke::new(Ink::Faint, 1.0));
     picture.shapes.push(Shape::Area { points: corners, fill: None, stroke, round: false });
@@ -183,6 +172,14 @@ fn legend(panel: &Panel, left: f64, wide: f64, top: f64, picture: &mut Picture) 
         words.anchor = Anchor::Start;
         picture.words(words);
         x += need;
+        any = true;
+    }
+    for key in &panel.keys {
+        marks::mark((x + 5.0, y - 4.0), key.ink, key.cross, picture);
+        let mut words = Words::new((x + 15.0, y), key.name.as_str(), SIZE, Ink::Plain);
+        words.anchor = Anchor::Start;
+        x += 15.0 + words.width() + 16.0;
+        picture.words(words);
         any = true;
     }
     if any { y + 4.0 } else { top }

@@ -273,7 +273,7 @@ fn nyquist(names: &Names, imaginary: usize, choice: &Choice, panels: &mut Vec<(S
         x: axis("real part"),
         y: axis("imaginary part"),
         equal: true,
-        marks: vec![Mark { at: (-1.0, 0.0), ink: Ink::Warning, cross: true }],
+        marks: vec![Mark { at: (-1.0, 0.0), ink: Ink::Warning, cross: true, name: String::new() }],
         ..Panel::default()
     });
     let points = |rows: std::ops::Range<usize>| {
