@@ -99,15 +99,14 @@ fn circuit(
     let found = circuit_of(session, file, overrides, &mut d);
     session.say(d);
     let Some((circuit, kept)) = found else { return Err(session.exit()) };
-    let devices = kept.iter().filter(|kept| **kept).count();
-    if devices > schematic::MOST {
+    let placed = schematic::place(&circuit, &|id| kept[id.0 as usize]).map_err(|devices| {
         let message = format!("`{}` is too large to draw: {devices} devices", circuit.title);
         let error = Diagnostic::error("E1001", Span::NONE, message);
-        return Err(
-            session.fail(error.because(format!("a schematic holds at most {}", schematic::MOST)))
-        );
-    }
-    let placed = schematic::place(&circuit, &|id| kept[id.0 as usize]);
+        session.fail(error.because(format!(
+            "a schematic holds at most {}, what repeats counted once",
+            schematic::MOST
+        )))
+    })?;
     let text = match form {
         "tex" => schematic::circuitikz(&placed),
         _ => svg::write(&schematic::paint(&placed)),

@@ -14,9 +14,10 @@ use crate::netlist::dialects::NGSPICE;
 use crate::netlist::write;
 use crate::report::{self, Card, Contents};
 use crate::sim::{FailureKind, Progress, Statistics};
-use crate::source::FileId;
+use crate::source::{FileId, SourceMap, Span};
 use crate::trace::Trace;
 use crate::verify::Report as Proof;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// What it does, in a line.
@@ -63,6 +64,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let graph = graph(&model);
     let circuit = circuit(&model);
     let (netlist, map) = model.netlist(&session.map, &NGSPICE, true);
+    let places = places(&model);
+    let line = |of: &str| line(of, &places, &model, file, &session.map);
     let cards: Vec<Card> = map
         .cards
         .iter()
@@ -70,9 +73,11 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
             card: card.card.clone(),
             element: card.element.clone(),
             bond: card.bond.clone(),
-            line: card.line,
+            line: line(&card.element),
         })
         .collect();
+    let kinds = model.graph.vertices.iter().map(|v| format!("{}:{}", v.kind, v.name));
+    let lines = kinds.filter_map(|of| line(&of).map(|line| (of, line))).collect();
     let source = session.map.file(file).map_or(String::new(), |file| file.text.clone());
     let warned = session.said.iter().filter(|d| d.severity != Severity::Note);
     let warnings: Vec<String> =
@@ -89,9 +94,33 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
         proof: proof.as_ref(),
         netlist: &write::write(&netlist),
         cards: &cards,
+        lines: &lines,
         warnings: &warnings,
     });
     write_text(arguments.output.as_deref(), &text, session)
+}
+
+/// Where junctions, elements and signals are declared, by name.
+fn places(model: &pipeline::Model) -> HashMap<&str, Span> {
+    let vertices = model.graph.vertices.iter().map(|vertex| (vertex.name.as_str(), vertex.span));
+    let signals = model.graph.signals.iter().map(|signal| (signal.name.as_str(), signal.span));
+    signals.chain(vertices).collect()
+}
+
+/// The line of the page's own text in which something is declared (`R:eta`, `signal alpha`), or the instance that it is a
+/// part of where that has a text of its own.
+fn line(
+    of: &str,
+    places: &HashMap<&str, Span>,
+    model: &pipeline::Model,
+    file: FileId,
+    map: &SourceMap,
+) -> Option<usize> {
+    let name = of.rsplit([':', ' ']).next()?;
+    let own = places.get(name).filter(|span| span.file == file);
+    let instance = || model.graph.instances.get(name.split_once('.')?.0);
+    let (line, _) = map.position(*own.or_else(instance)?)?;
+    Some(line)
 }
 
 /// The run, all of it in memory.
@@ -155,11 +184,9 @@ fn circuit(model: &pipeline::Model) -> Result<crate::draw::picture::Picture, Str
         return Err("there is no circuit".to_string());
     };
     let kept = power_devices(model, &circuit);
-    let devices = kept.iter().filter(|kept| **kept).count();
-    if devices > schematic::MOST {
-        return Err(format!("{devices} devices are too many for a picture"));
-    }
-    Ok(schematic::paint(&schematic::place(&circuit, &|id| kept[id.0 as usize])))
+    let placed = schematic::place(&circuit, &|id| kept[id.0 as usize])
+        .map_err(|devices| format!("{devices} devices are too many for a picture"))?;
+    Ok(schematic::paint(&placed))
 }
 
 /// The counters of a run by name.

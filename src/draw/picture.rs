@@ -123,6 +123,8 @@ pub struct Words {
     pub italic: bool,
     /// Turned by a quarter, to be read upward.
     pub upward: bool,
+    /// What they speak of, where a page about it may lead to more: `R:eta`, the name of a device; else empty.
+    pub of: String,
 }
 
 /// The size of what stands below the line, as a part of the size of the words.
@@ -141,6 +143,7 @@ impl Words {
             bold: false,
             italic: false,
             upward: false,
+            of: String::new(),
         }
     }
 

@@ -14,11 +14,13 @@ pub fn write(picture: &Picture) -> String {
             "<style>{}</style>\n<rect class=\"bs-paper-f\" width=\"100%\" height=\"100%\"/>\n",
             style()
         ),
+        &|_| None,
     )
 }
 
-/// Writes a picture that stands within a page which has the [`style`] already.
-pub fn inside(picture: &Picture, head: &str) -> String {
+/// Writes a picture that stands within a page which has the [`style`] already; `link` says where words lead, by what they
+/// speak of.
+pub fn inside(picture: &Picture, head: &str, link: &dyn Fn(&str) -> Option<String>) -> String {
     let (w, h) = (number(picture.width), number(picture.height));
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"bs\" width=\"{w}\" height=\"{h}\" \
@@ -26,8 +28,15 @@ viewBox=\"0 0 {w} {h}\" role=\"img\">\n<title>{}</title>\n{head}",
         escape(&picture.title)
     );
     for shape in &picture.shapes {
+        let to = match shape {
+            Shape::Words { words, .. } if !words.of.is_empty() => link(&words.of),
+            _ => None,
+        };
+        if let Some(to) = &to {
+            let _ = write!(out, "<a href=\"{}\">", escape(to));
+        }
         self::shape(shape, &mut out);
-        out.push('\n');
+        out.push_str(if to.is_some() { "</a>\n" } else { "\n" });
     }
     out + "</svg>\n"
 }

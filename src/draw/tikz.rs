@@ -46,6 +46,8 @@ pub fn escape(text: &str) -> String {
             '²' => out += "$^2$",
             '³' => out += "$^3$",
             '°' => out += "$^\\circ$",
+            'ζ' => out += "$\\zeta$",
+            '∠' => out += "$\\angle$",
             '∫' => out += "$\\int$",
             'φ' | 'Φ' => out += "$\\Phi$",
             letter if letter.is_control() => out.push(' '),

@@ -47,6 +47,8 @@ pub struct Contents<'a> {
     pub netlist: &'a str,
     /// Where its cards come from.
     pub cards: &'a [Card],
+    /// Junctions and elements, `1:shaft`, with their lines of the source; those of an instance with the instance's.
+    pub lines: &'a BTreeMap<String, usize>,
     /// Warnings of all stages, one text each.
     pub warnings: &'a [String],
 }
@@ -95,8 +97,8 @@ type Section = (&'static str, &'static str, fn(&Contents) -> String);
 /// The sections in their order: anchor, title, what stands in them.
 const SECTIONS: &[Section] = &[
     ("waveforms", "Waveforms", waveforms),
-    ("graph", "Bond graph", |contents| picture(&contents.graph)),
-    ("circuit", "Circuit", |contents| picture(&contents.circuit)),
+    ("graph", "Bond graph", |contents| picture(&contents.graph, &|of| element_link(contents, of))),
+    ("circuit", "Circuit", |contents| picture(&contents.circuit, &|of| card_link(contents, of))),
     ("causality", "Causality", |contents| format!("<pre>{}</pre>\n", lines(contents.causality))),
     ("certificate", "Certificate", certificate),
     ("energy", "Energy", energy),
@@ -139,9 +141,22 @@ fn waveforms(contents: &Contents) -> String {
     out + "<div id=\"charts\"></div>\n"
 }
 
-fn picture(picture: &Result<Picture, String>) -> String {
+/// Where an element of the bond graph leads: to its cards, else to its line.
+fn element_link(contents: &Contents, of: &str) -> Option<String> {
+    let row = elements_in_order(contents.cards).into_iter().position(|(element, _)| element == of);
+    let line = || contents.lines.get(of).map(|line| format!("#line-{line}"));
+    row.map(|row| format!("#element-{row}")).or_else(line)
+}
+
+/// Where a device of the circuit leads: to its card.
+fn card_link(contents: &Contents, of: &str) -> Option<String> {
+    let card = contents.cards.iter().find(|card| card.card.eq_ignore_ascii_case(of))?;
+    Some(format!("#{}", anchor(&card.card)))
+}
+
+fn picture(picture: &Result<Picture, String>, link: &dyn Fn(&str) -> Option<String>) -> String {
     match picture {
-        Ok(picture) => format!("<div class=\"picture\">{}</div>\n", svg::inside(picture, "")),
+        Ok(picture) => format!("<div class=\"picture\">{}</div>\n", svg::inside(picture, "", link)),
         Err(why) => format!("<p class=\"faint\">{}</p>\n", escape(why)),
     }
 }
@@ -204,22 +219,25 @@ fn anchor(card: &str) -> String {
     format!("card-{}", escape(card).replace(' ', "_"))
 }
 
-fn elements(contents: &Contents) -> String {
-    // Elements in the order of their first cards.
-    let mut order: Vec<&str> = vec![];
-    let mut cards: BTreeMap<&str, Vec<&Card>> = BTreeMap::new();
-    for card in contents.cards {
-        let own = cards.entry(&card.element).or_default();
-        if own.is_empty() {
-            order.push(&card.element);
+/// Elements in the order of their first cards, each with its cards.
+fn elements_in_order(cards: &[Card]) -> Vec<(&str, Vec<&Card>)> {
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut found: Vec<(&str, Vec<&Card>)> = vec![];
+    for card in cards {
+        let place = *places.entry(&card.element).or_insert(found.len());
+        match found.get_mut(place) {
+            Some((_, own)) => own.push(card),
+            None => found.push((&card.element, vec![card])),
         }
-        own.push(card);
     }
+    found
+}
+
+fn elements(contents: &Contents) -> String {
     let mut out = String::from(
         "<table>\n<tr><th>element</th><th>bond</th><th>source</th><th>cards</th></tr>\n",
     );
-    for (at, element) in order.into_iter().enumerate() {
-        let own = &cards[element];
+    for (at, (element, own)) in elements_in_order(contents.cards).into_iter().enumerate() {
         let bond = own.iter().find_map(|card| card.bond.as_deref()).unwrap_or("");
         let line = own.iter().find_map(|card| card.line);
         let line =
@@ -303,6 +321,7 @@ fn statistics(contents: &Contents) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::picture::{Ink, Words};
 
     #[test]
     fn names_and_texts_are_escaped_and_links_lead_somewhere() {
@@ -317,20 +336,31 @@ mod tests {
             units: vec!["s".into(), String::new()],
             columns: vec![vec![0.0, 1.0], vec![1.0, 2.0]],
         };
+        let drawn = |of: &str| {
+            let mut picture = Picture { title: "<c>".into(), ..Picture::default() };
+            let mut words = Words::new((5.0, 5.0), "r", 10.0, Ink::Plain);
+            words.of = of.into();
+            picture.words(words);
+            picture
+        };
         let contents = Contents {
             name: "a & b",
             source: "# x < y\n0:a -> R:r(1 Ohm)\n",
             trace: &trace,
             statistics: vec![("rows".into(), "2".into())],
-            graph: Err("too large".into()),
-            circuit: Ok(Picture { title: "<c>".into(), width: 10.0, height: 10.0, shapes: vec![] }),
+            graph: Ok(drawn("R:r")),
+            circuit: Ok(drawn("R_r")),
             causality: "a ->| r",
             proof: None,
             netlist: "* a\nr_r a 0 1\n",
             cards: &cards,
+            lines: &BTreeMap::new(),
             warnings: &["watch <out>".into()],
         };
         let page = write(&contents);
+        // Words in drawings lead to the element's row and to the card.
+        assert!(page.contains("<a href=\"#element-0\"><text") && page.contains("id=\"element-0\""));
+        assert!(page.contains("<a href=\"#card-R_r\"><text"));
         assert!(page.contains("<title>a &amp; b: bondspice report</title>"));
         assert!(page.contains("x &lt; y") && page.contains("watch &lt;out&gt;"));
         assert_eq!(page.matches("</script>").count(), 3, "data cannot end its element");

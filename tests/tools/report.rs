@@ -83,6 +83,7 @@ fn a_million_points_load_and_zoom_without_an_error() {
         proof: None,
         netlist: "",
         cards: &[],
+        lines: &Default::default(),
         warnings: &[],
     });
     assert!(page.len() < 20_000_000, "{} bytes", page.len());

@@ -6,8 +6,10 @@
 //! stroke stands at the end on which the effort is imposed. Bonds are numbered in the order of the file.
 
 mod sketch;
+mod signals;
 mod place;
 mod paint;
+mod blocks;
 mod dot;
 #[cfg(test)]
 mod tests;
@@ -15,6 +17,7 @@ mod tests;
 pub use dot::write as dot;
 pub use paint::paint;
 pub use place::{Placed, place};
+pub use signals::{Block, BlockKind, Signals, Tap};
 pub use sketch::{Group, Link, Node, NodeKind, Sketch, fitting, sketch};
 
 use super::picture::Ink;

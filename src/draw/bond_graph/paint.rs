@@ -1,6 +1,7 @@
 //! The picture of a placed sketch: nodes first, then bonds cut at their words, then labels where there is room.
 
 use super::super::picture::{Anchor, Ink, Picture, Point, Room, Shape, Stroke, Words};
+use super::blocks;
 use super::letters;
 use super::place::Placed;
 use super::sketch::{Group, Link, Node, NodeKind, Sketch};
@@ -13,6 +14,8 @@ const SIZES: (f64, f64, f64) = (14.0, 10.5, 12.0);
 const GAP: f64 = 5.0;
 /// The room around everything.
 const MARGIN: f64 = 14.0;
+/// Blocks of signals have at least so much width.
+const LEAST_PAGE: f64 = 700.0;
 
 /// The words of a node around a place.
 pub(super) fn node_words(node: &Node, at: Point) -> Vec<Words> {
@@ -85,8 +88,9 @@ pub fn paint(graph: &BondGraph, sketch: &Sketch, placed: &Placed) -> Picture {
             let stroke = Some(Stroke::new(Ink::Plain, 1.2));
             picture.shapes.push(Shape::Area { points: corners, fill: None, stroke, round: true });
         }
-        for words in words {
+        for mut words in words {
             let title = node.told.clone();
+            words.of.clone_from(&node.of);
             picture.shapes.push(Shape::Words { words, title });
         }
         rooms.push(room);
@@ -113,8 +117,22 @@ pub fn paint(graph: &BondGraph, sketch: &Sketch, placed: &Placed) -> Picture {
     for (k, link) in sketch.links.iter().enumerate() {
         labels.bond(k, link);
     }
+    for tap in &sketch.signals.taps {
+        let node = labels.taken[tap.node];
+        let trouble = |room: &Room, line: (Point, Point)| {
+            labels.trouble(room, usize::MAX) + labels.passes(line, room, tap.node)
+        };
+        let room = blocks::tap(tap, &node, &trouble, &mut picture);
+        labels.taken.push(room);
+    }
     titles.extend(labels.words);
     titles.into_iter().for_each(|words| picture.words(words));
+    if !sketch.signals.blocks.is_empty()
+        && let Some(all) = room_of(picture.shapes.iter().map(Shape::room))
+    {
+        let page = (all.right - all.left).max(LEAST_PAGE);
+        blocks::paint(&sketch.signals, (all.left, all.bottom + 34.0), page, &mut picture);
+    }
     legend(sketch, &mut picture);
     picture.fit(MARGIN);
     picture
@@ -230,6 +248,26 @@ impl Labels {
     }
 }
 
+impl Labels {
+    /// How much a short arrow at a node passes over, and how many edges its words.
+    fn passes(&self, (a, b): (Point, Point), words: &Room, node: usize) -> f64 {
+        let others = self.taken.iter().enumerate().filter(|(k, _)| *k != node);
+        let over = others.filter(|(_, room)| room.cuts(a, b).is_some()).count();
+        let edges = self.edges.iter().filter(|(p, q)| words.cuts(*p, *q).is_some()).count();
+        let along = Room {
+            left: a.0.min(b.0),
+            top: a.1.min(b.1),
+            right: a.0.max(b.0),
+            bottom: a.1.max(b.1),
+        };
+        // Near another line is as bad as over it.
+        let near = along.grown(3.0);
+        let lines = self.lines.iter().flatten().chain(&self.edges);
+        0.02 * edges as f64
+            + 20.0 * (over + lines.filter(|(p, q)| near.cuts(*p, *q).is_some()).count()) as f64
+    }
+}
+
 /// What the colours and marks mean, below the drawing, and its title above.
 fn legend(sketch: &Sketch, picture: &mut Picture) {
     let Some(all) = room_of(picture.shapes.iter().map(Shape::room)) else { return };
@@ -256,6 +294,10 @@ fn legend(sketch: &Sketch, picture: &mut Picture) {
     if sketch.links.iter().any(|link| link.ring > 0) {
         let text = if sketch.loops > 1 { "algebraic loops" } else { "algebraic loop" };
         entries.push((Some(Stroke::new(Ink::Curve(6), 11.0).sheer(0.35)), text.into(), Ink::Plain));
+    }
+    if sketch.signals.left_out > 0 {
+        let text = format!("{} signals without blocks", sketch.signals.left_out);
+        entries.push((None, text, Ink::Faint));
     }
     let (mut x, mut y) = (all.left, all.bottom + 26.0);
     for (stroke, text, ink) in entries {

@@ -1,6 +1,7 @@
 //! What a drawing shows before anything has a place: nodes, links, and the boxes of instances, deep ones as one node each.
 
 use super::super::text::cut;
+use super::signals::{self, Signals};
 use crate::bond::causality::Causality;
 use crate::bond::graph::{
     BondGraph, BondId, Dissipation, Expr, Law, Leaf, Modulus, Storage, StoreLaw, Stroke, VertexId,
@@ -35,6 +36,8 @@ pub struct Node {
     pub modulated: bool,
     /// All that is known of it, in words.
     pub told: String,
+    /// Its kind and full name, `R:motor.R`; empty for an instance that is drawn as one.
+    pub of: String,
     /// What it is.
     pub kind: NodeKind,
     /// Whether it is a storage in derivative causality.
@@ -88,6 +91,8 @@ pub struct Sketch {
     pub groups: Vec<Group>,
     /// Algebraic loops.
     pub loops: usize,
+    /// What carries no power.
+    pub signals: Signals,
     /// How deep instances are laid open.
     pub depth: usize,
     /// How deep they could be.
@@ -122,6 +127,7 @@ pub fn sketch(graph: &BondGraph, causality: &Causality, depth: usize) -> Sketch 
                 below: instance.model.clone(),
                 modulated: false,
                 told: format!("{}: {}", instance.model, instance.name),
+                of: String::new(),
                 kind: NodeKind::Part,
                 dependent: false,
                 group: group_of[parent],
@@ -161,6 +167,9 @@ pub fn sketch(graph: &BondGraph, causality: &Causality, depth: usize) -> Sketch 
             ring: ring.map_or(0, |ring| ring + 1),
         });
     }
+    let closed: Vec<bool> = part_of.iter().map(Option::is_some).collect();
+    let title = |node: usize| sketch.nodes[node].title.clone();
+    sketch.signals = signals::read(graph, &closed, &node_of, &title);
     for k in 0..sketch.nodes.len() {
         let mut domains =
             sketch.links.iter().filter(|l| l.from == k || l.to == k).map(|l| l.domain);
@@ -226,6 +235,7 @@ fn node(graph: &BondGraph, causality: &Causality, id: VertexId, home: &str, grou
         below,
         modulated,
         told: format!("{}:{}, {}", vertex.kind, vertex.name, words::law(graph, &vertex.law)),
+        of: format!("{}:{}", vertex.kind, vertex.name),
         kind,
         dependent: causality.dependent.iter().any(|d| d.storage.vertex == id),
         group,

@@ -77,3 +77,28 @@ Se:U(1 V) -> 1:loop\nloop -> Pair:p, Pair:q\n";
     let boxes: Vec<_> = placed.boxes.iter().flatten().collect();
     assert!(boxes.len() == 2 && !boxes[0].overlaps(boxes[1]));
 }
+
+#[test]
+fn signals_are_blocks_between_what_is_measured_and_what_follows() {
+    let text = "param K = 2 V*s\ninput ref\nsignal x = integ(f(shaft))\nsignal u = K*(ref - f(shaft)) + 1 V*x\n\
+Se:U(u) -> 1:mesh -> GY:m(0.1 V*s) -> 1:shaft\nmesh -> R:R(1 Ohm)\nshaft -> I:J(1 kg*m^2)\ndrive ref = step(1 s, 0, 1)\n";
+    let (sketch, _, picture, _) = drawn(text);
+    let signals = &sketch.signals;
+    let titles: Vec<&str> = signals.blocks.iter().map(|block| block.title.as_str()).collect();
+    assert_eq!(signals.blocks.iter().filter(|b| b.kind == BlockKind::Signal).count(), 3);
+    let place = |title: &str| titles.iter().position(|t| *t == title).unwrap();
+    let mut arrows: Vec<(&str, &str)> =
+        signals.arrows.iter().map(|(from, to)| (titles[*from], titles[*to])).collect();
+    arrows.sort_unstable();
+    let wanted = [("f(shaft)", "u"), ("f(shaft)", "x"), ("ref", "u"), ("u", "Se: U"), ("x", "u")];
+    assert_eq!(arrows, wanted);
+    assert_eq!(signals.blocks[place("x")].law, "∫ f(shaft)");
+    assert_eq!(signals.blocks[place("ref")].law, "step(t)");
+    let node = |title: &str| sketch.nodes.iter().position(|node| node.title == title);
+    let source = Tap { node: node("Se: U").unwrap(), text: "u".into(), into: true };
+    assert!(signals.taps.contains(&source), "{:?}", signals.taps);
+    assert!(signals.taps.iter().any(|tap| !tap.into && tap.text == "f(shaft)"));
+    assert!(svg::write(&picture).contains("∫ f(shaft)"));
+    let (sketch, ..) = drawn(MESH);
+    assert!(sketch.signals.blocks.is_empty() && sketch.signals.taps.is_empty());
+}

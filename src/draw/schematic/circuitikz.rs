@@ -63,5 +63,12 @@ pub fn write(schematic: &Schematic) -> String {
             escape(name)
         );
     }
+    for (place, text) in &schematic.repeats {
+        out += &format!(
+            "\\node[anchor=base west,inner sep=0,gray] at {} {{{}}};\n",
+            at(*place),
+            escape(text)
+        );
+    }
     out + "\\end{circuitikz}\n\\end{document}\n"
 }

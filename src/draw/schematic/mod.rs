@@ -2,9 +2,12 @@
 //! bridges nodes that do not stand side by side runs in layers above.
 //!
 //! Each part of the circuit that hangs together without ground is drawn by itself. Its main nodes stand along a line;
-//! what leads from one of them to ground, directly or by nodes of its own, hangs below it.
+//! what leads from one of them to ground, directly or by nodes of its own, hangs below it. Parts that are alike, as those of
+//! an array of models, are drawn once.
 
 mod plan;
+mod alike;
+mod rows;
 mod place;
 mod paint;
 mod symbols;

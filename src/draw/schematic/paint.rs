@@ -34,6 +34,11 @@ pub fn paint(schematic: &Schematic) -> Picture {
         words.anchor = Anchor::Start;
         picture.words(words);
     }
+    for (at, text) in &schematic.repeats {
+        let mut words = Words::new(*at, text.as_str(), SIZES.0, Ink::Faint);
+        (words.anchor, words.bold) = (Anchor::Start, true);
+        picture.words(words);
+    }
     let all = picture.shapes.iter().map(Shape::room).reduce(|a, b| a.with(&b));
     if let Some(all) = all {
         let mut title =
@@ -199,6 +204,7 @@ fn words(placed: &Placed, frame: &Frame, picture: &mut Picture) {
         if !text.is_empty() {
             let mut words = Words::new(at, text.as_str(), size, ink);
             words.anchor = if lying { Anchor::Middle } else { Anchor::Start };
+            words.of.clone_from(&placed.name);
             picture.words(words);
         }
     }

@@ -1,7 +1,10 @@
 //! Gives every device of a plan its place: a column for each way to ground, a row for each layer above the line.
 
 use super::super::text;
+use super::MOST;
+use super::alike::{Repeated, gather};
 use super::plan::{Part, Shunt, plan};
+use super::rows::{self, PAGE};
 use super::symbols::{Symbol, symbol, value};
 use crate::circuit::{Circuit, DeviceId, NodeId};
 
@@ -14,8 +17,6 @@ const LAYER: f64 = 54.0;
 const GAP: f64 = 34.0;
 /// The size of the letters at devices and at nodes.
 pub const SIZES: (f64, f64) = (10.5, 9.5);
-/// The least width at which a row of parts ends.
-const PAGE: f64 = 1500.0;
 
 /// A device between two points, its first node at the first.
 #[derive(Clone, Debug)]
@@ -28,6 +29,8 @@ pub struct Placed {
     pub ends: ((f64, f64), (f64, f64)),
     /// Its name and value.
     pub words: (String, String),
+    /// Its whole name.
+    pub name: String,
 }
 
 /// All that is drawn.
@@ -45,21 +48,35 @@ pub struct Schematic {
     pub grounds: Vec<(f64, f64)>,
     /// Names of nodes: left end of their base line.
     pub names: Vec<((f64, f64), String)>,
+    /// What is said of parts that repeat: left end of its base line.
+    pub repeats: Vec<((f64, f64), String)>,
     /// Devices that are left out.
     pub left_out: usize,
 }
 
-/// Places the devices that are kept.
-pub fn place(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Schematic {
+/// Places the devices that are kept; of parts that are alike the first.
+///
+/// # Errors
+/// How many devices there are, where they are more than a picture holds.
+pub fn place(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Result<Schematic, usize> {
     let mut all = Schematic { title: circuit.title.clone(), ..Schematic::default() };
     let drawn = |k: usize| keep(DeviceId(k as u32));
     all.left_out = (0..circuit.devices.len()).filter(|k| !drawn(*k)).count();
     let (mut left, mut top, mut lowest) = (0.0, 0.0, 0.0_f64);
     let mut parts = vec![];
-    for part in plan(circuit, keep) {
-        let mut drawn = Drawn { circuit, schematic: Schematic::default() };
-        let room = drawn.part(&part);
+    for repeated in gather(circuit, plan(circuit, keep, MOST)?) {
+        let (mut drawn, mut room) = rows::draw(circuit, &repeated.part);
+        if repeated.count > 1 {
+            let Repeated { first, last, count, .. } = &repeated;
+            let words = format!("{count} alike: {first} … {last}");
+            room.0 = room.0.max(text::width(&words, SIZES.0) + 10.0);
+            drawn.schematic.repeats.push(((0.0, 0.0), words));
+        }
         parts.push((drawn, room));
+    }
+    let devices = parts.iter().map(|(drawn, _)| drawn.schematic.devices.len()).sum();
+    if devices > MOST {
+        return Err(devices);
     }
     // A row is as wide as a page, or as the widest part.
     let page = parts.iter().map(|(_, room)| room.0).fold(PAGE, f64::max);
@@ -67,16 +84,20 @@ pub fn place(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Schematic {
         if left > 0.0 && left + width > page {
             (left, top) = (0.0, lowest + GAP);
         }
-        drawn.schematic.shift(left, top + above);
+        // Words about a part stand above all of it.
+        let words = if drawn.schematic.repeats.is_empty() { 0.0 } else { 1.6 * SIZES.0 };
+        drawn.schematic.shift(left, top + above + words);
+        drawn.schematic.repeats.iter_mut().for_each(|(at, _)| at.1 = top + SIZES.0);
+        let above = above + words;
         lowest = lowest.max(top + above + below);
         left += width + GAP;
         all.take(drawn.schematic);
     }
-    all
+    Ok(all)
 }
 
 impl Schematic {
-    fn shift(&mut self, x: f64, y: f64) {
+    pub(super) fn shift(&mut self, x: f64, y: f64) {
         let shift = |p: &mut (f64, f64)| *p = (p.0 + x, p.1 + y);
         self.devices.iter_mut().for_each(|d| {
             shift(&mut d.ends.0);
@@ -87,24 +108,32 @@ impl Schematic {
             shift(&mut w.1);
         });
         self.dots.iter_mut().chain(&mut self.grounds).for_each(shift);
-        self.names.iter_mut().for_each(|(at, _)| shift(at));
+        self.names.iter_mut().chain(&mut self.repeats).for_each(|(at, _)| shift(at));
     }
 
-    fn take(&mut self, other: Schematic) {
+    pub(super) fn take(&mut self, other: Schematic) {
         self.devices.extend(other.devices);
         self.wires.extend(other.wires);
         self.dots.extend(other.dots);
         self.grounds.extend(other.grounds);
         self.names.extend(other.names);
+        self.repeats.extend(other.repeats);
     }
 }
 
-struct Drawn<'a> {
+/// A part in the making, its line at y = 0.
+pub(super) struct Drawn<'a> {
     circuit: &'a Circuit,
-    schematic: Schematic,
+    pub(super) schematic: Schematic,
+    /// Where each node of the line begins and ends.
+    pub(super) places: Vec<(f64, f64)>,
 }
 
-impl Drawn<'_> {
+impl<'a> Drawn<'a> {
+    pub(super) fn new(circuit: &'a Circuit) -> Drawn<'a> {
+        Drawn { circuit, schematic: Schematic::default(), places: vec![] }
+    }
+
     fn name(&self, node: NodeId) -> &str {
         self.circuit.nodes.get(node.0 as usize).map_or("", |node| &*node.name)
     }
@@ -125,17 +154,18 @@ impl Drawn<'_> {
         let own = &self.circuit.devices[device.0 as usize];
         let ends = if own.nodes.first() == Some(&from) { (first, second) } else { (second, first) };
         let words = self.words(device);
-        self.schematic.devices.push(Placed { device, symbol: symbol(own), ends, words });
+        let (symbol, name) = (symbol(own), own.name.to_string());
+        self.schematic.devices.push(Placed { device, symbol, ends, words, name });
     }
 
-    fn wire(&mut self, a: (f64, f64), b: (f64, f64)) {
+    pub(super) fn wire(&mut self, a: (f64, f64), b: (f64, f64)) {
         if a != b {
             self.schematic.wires.push((a, b));
         }
     }
 
     /// Draws a part with its line at y = 0; gives its width and how far it reaches above and below.
-    fn part(&mut self, part: &Part) -> (f64, f64, f64) {
+    pub(super) fn part(&mut self, part: &Part) -> (f64, f64, f64) {
         let depth = part.line.iter().flat_map(|(_, s)| s).map(depth).max().unwrap_or(0);
         let bottom = HIGH * depth as f64;
         // From left to right: the ways to ground of a node, then what stands between it and the next.
@@ -184,6 +214,7 @@ impl Drawn<'_> {
         }
         let above = self.layers(part, &places);
         self.feet(feet, bottom);
+        self.places = places;
         (x + 10.0, above, bottom + 24.0)
     }
 

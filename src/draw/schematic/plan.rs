@@ -40,7 +40,14 @@ struct Graph {
 const GROUND: NodeId = NodeId(0);
 
 /// Plans the drawing of the devices that are kept.
-pub fn plan(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Vec<Part> {
+///
+/// # Errors
+/// How many devices a part has that has more than `most`.
+pub fn plan(
+    circuit: &Circuit,
+    keep: &dyn Fn(DeviceId) -> bool,
+    most: usize,
+) -> Result<Vec<Part>, usize> {
     let mut graph = Graph { ends: vec![], beside: BTreeMap::new() };
     for (k, device) in circuit.devices.iter().enumerate() {
         let id = DeviceId(k as u32);
@@ -64,25 +71,29 @@ pub fn plan(circuit: &Circuit, keep: &dyn Fn(DeviceId) -> bool) -> Vec<Part> {
     let order: Vec<NodeId> = graph.ends.iter().flat_map(|(_, a, b)| [*a, *b]).collect();
     for node in order {
         if node != GROUND && !seen.contains(&node) {
-            let nodes = graph.reach(node, &|_| true);
-            seen.extend(nodes.iter().copied());
+            let nodes = graph.reach(node);
+            let own: BTreeSet<NodeId> = nodes.iter().copied().collect();
+            let is_own =
+                |(_, a, b): &&(DeviceId, NodeId, NodeId)| own.contains(a) || own.contains(b);
+            let devices = graph.ends.iter().filter(is_own).count();
+            if devices > most {
+                return Err(devices);
+            }
+            seen.extend(own);
             parts.push(graph.part(&nodes));
         }
     }
-    parts
+    Ok(parts)
 }
 
 impl Graph {
-    /// All nodes that hang together with one, over nodes that are allowed.
-    fn reach(&self, start: NodeId, allowed: &dyn Fn(NodeId) -> bool) -> Vec<NodeId> {
+    /// All nodes that hang together with one.
+    fn reach(&self, start: NodeId) -> Vec<NodeId> {
         let mut found = vec![start];
+        let mut seen = BTreeSet::from([start]);
         let mut at = 0;
         while at < found.len() {
-            for next in &self.beside[&found[at]] {
-                if allowed(*next) && !found.contains(next) {
-                    found.push(*next);
-                }
-            }
+            found.extend(self.beside[&found[at]].iter().copied().filter(|next| seen.insert(*next)));
             at += 1;
         }
         found

@@ -43,7 +43,7 @@ fn a_ladder_is_drawn_as_one() {
             ("c2", 3, 0, 'c'),
         ],
     );
-    let drawn = place(&own, &|_| true);
+    let drawn = place(&own, &|_| true).unwrap();
     let lies: Vec<bool> = drawn.devices.iter().map(lying).collect();
     assert_eq!(lies.iter().filter(|lies| **lies).count(), 2);
     let x = |name: &str| drawn.devices.iter().find(|d| d.words.0 == name).unwrap().ends.0.0;
@@ -65,7 +65,7 @@ fn what_bridges_stands_in_a_layer_above() {
             ("r4", 3, 0, 'r'),
         ],
     );
-    let drawn = place(&own, &|_| true);
+    let drawn = place(&own, &|_| true).unwrap();
     let layers: Vec<f64> = drawn.devices.iter().filter(|d| lying(d)).map(|d| d.ends.0.1).collect();
     assert_eq!(layers.len(), 3);
     let top = layers.iter().copied().fold(f64::INFINITY, f64::min);
@@ -95,11 +95,75 @@ fn what_ends_in_ground_hangs_below_its_node() {
             ("c2", 3, 0, 'c'),
         ],
     );
-    let drawn = place(&own, &|_| true);
+    let drawn = place(&own, &|_| true).unwrap();
     // The longest way is the line b-a-c; everything else stands upright.
     assert_eq!(drawn.devices.iter().filter(|d| lying(d)).count(), 2);
-    let kept = place(&own, &|id| id.0 != 4);
+    let kept = place(&own, &|id| id.0 != 4).unwrap();
     assert_eq!((kept.devices.len(), kept.left_out), (4, 1));
+}
+
+/// Islands of a source, a resistor and a capacitor each, named as instances of an array are.
+fn islands(count: u32) -> Circuit {
+    let mut names = vec!["0".to_string()];
+    let mut devices = vec![];
+    for k in 1..=count {
+        let at = names.len() as u32;
+        names.extend([format!("eha_{k}_in"), format!("eha_{k}_out")]);
+        devices.push((format!("v_eha_{k}_u"), at, 0, 'v'));
+        devices.push((format!("r_eha_{k}_r"), at, at + 1, 'r'));
+        devices.push((format!("c_eha_{k}_c"), at + 1, 0, 'c'));
+    }
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let devices: Vec<_> = devices.iter().map(|d| (d.0.as_str(), d.1, d.2, d.3)).collect();
+    circuit(&names, &devices)
+}
+
+#[test]
+fn parts_that_are_alike_are_drawn_once() {
+    let mut own = islands(100);
+    let drawn = place(&own, &|_| true).unwrap();
+    assert_eq!(drawn.devices.len(), 3);
+    assert_eq!(drawn.repeats[0].1, "100 alike: eha_1 … eha_100");
+    // One value makes a difference, and so does a name that has nothing to do with the number.
+    own.devices[4].kind = DeviceKind::Resistor { resistance: 1.0 };
+    assert_eq!(place(&own, &|_| true).unwrap().devices.len(), 6);
+    let mut own = islands(3);
+    own.devices[4].name = "r_eha_2_other".into();
+    assert_eq!(place(&own, &|_| true).unwrap().devices.len(), 6);
+}
+
+/// A ladder of so many sections.
+fn ladder(count: u32) -> Circuit {
+    let names: Vec<String> =
+        std::iter::once("0".into()).chain((0..=count).map(|k| format!("node{k}"))).collect();
+    let mut devices = vec![("v1".to_string(), 1, 0, 'v')];
+    for k in 1..=count {
+        devices.push((format!("r{k}"), k, k + 1, 'r'));
+        devices.push((format!("c{k}"), k + 1, 0, 'c'));
+    }
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let devices: Vec<_> = devices.iter().map(|d| (d.0.as_str(), d.1, d.2, d.3)).collect();
+    circuit(&names, &devices)
+}
+
+#[test]
+fn a_long_ladder_goes_on_in_rows() {
+    let drawn = place(&ladder(40), &|_| true).unwrap();
+    assert_eq!(drawn.devices.len(), 81);
+    let right = drawn.devices.iter().map(|d| d.ends.0.0.max(d.ends.1.0)).fold(0.0, f64::max);
+    assert!(right < 1.2 * rows::PAGE, "{right}");
+    let (rows, first) = (drawn.grounds.len(), drawn.grounds[0].1);
+    assert!(rows > 2 && drawn.grounds.iter().all(|at| at.1 >= first), "{rows} rows");
+    // One after the other, as the lines of a text.
+    let line = |name: &str| drawn.devices.iter().find(|d| d.name == name).unwrap().ends.0.1;
+    assert!(line("r1") < line("r20") && line("r20") < line("r40"));
+}
+
+#[test]
+fn what_is_too_large_is_known_at_once() {
+    let begin = std::time::Instant::now();
+    assert_eq!(place(&ladder(10_000), &|_| true).unwrap_err(), 20_001);
+    assert!(begin.elapsed().as_secs_f64() < 5.0, "{:?}", begin.elapsed());
 }
 
 #[test]
