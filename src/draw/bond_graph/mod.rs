@@ -8,6 +8,7 @@
 mod sketch;
 mod signals;
 mod place;
+mod fold;
 mod paint;
 mod blocks;
 mod dot;

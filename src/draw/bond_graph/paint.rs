@@ -55,8 +55,8 @@ pub fn paint(graph: &BondGraph, sketch: &Sketch, placed: &Placed) -> Picture {
     let mut picture = Picture { title: sketch.title.clone(), ..Picture::default() };
     let mut rooms = vec![];
     let (mut frames, mut edges) = (vec![], vec![]);
-    for (group, room) in sketch.groups.iter().zip(&placed.boxes) {
-        let Some(room) = room else { continue };
+    let boxes = sketch.groups.iter().zip(&placed.boxes);
+    for (group, room) in boxes.flat_map(|(group, own)| own.iter().map(move |room| (group, room))) {
         let corners = vec![
             (room.left, room.top),
             (room.right, room.top),
@@ -96,7 +96,7 @@ pub fn paint(graph: &BondGraph, sketch: &Sketch, placed: &Placed) -> Picture {
         rooms.push(room);
     }
     let lines: Vec<Option<(Point, Point)>> =
-        sketch.links.iter().map(|link| visible(link, placed, &rooms)).collect();
+        (0..sketch.links.len()).map(|k| visible(sketch, k, placed, &rooms)).collect();
     for (link, line) in sketch.links.iter().zip(&lines) {
         if let (true, Some((a, b))) = (link.ring > 0, line) {
             // Below everything, as with a marker pen.
@@ -105,9 +105,11 @@ pub fn paint(graph: &BondGraph, sketch: &Sketch, placed: &Placed) -> Picture {
             picture.shapes.insert(0, Shape::Line { points, stroke, title: String::new() });
         }
     }
-    for (link, line) in sketch.links.iter().zip(&lines) {
+    for (k, (link, line)) in sketch.links.iter().zip(&lines).enumerate() {
         if let Some((a, b)) = line {
-            bond(graph, link, *a, *b, &mut picture);
+            let way = lead(sketch, k, placed, &rooms);
+            edges.extend(way.windows(2).map(|ends| (ends[0], ends[1])));
+            bond(graph, link, (*a, *b), way, &mut picture);
         }
     }
     let mut titles: Vec<Words> =
@@ -155,9 +157,24 @@ fn free_title(group: &Group, room: &Room, lines: &[Option<(Point, Point)>]) -> W
     words
 }
 
-/// The part of a bond between the words at its ends.
-fn visible(link: &Link, placed: &Placed, rooms: &[Room]) -> Option<(Point, Point)> {
+/// The way of a bond from its tail to its last turn, where it leads to another row.
+fn lead(sketch: &Sketch, own: usize, placed: &Placed, rooms: &[Room]) -> Vec<Point> {
+    let (link, turns) = (&sketch.links[own], &placed.turns[own]);
+    let Some(first) = turns.first() else { return vec![] };
+    let tail = placed.nodes[link.from];
+    let part = rooms[link.from].grown(GAP).cuts(tail, *first).map_or(0.0, |cut| cut.1);
+    let start = (tail.0 + part * (first.0 - tail.0), tail.1 + part * (first.1 - tail.1));
+    std::iter::once(start).chain(turns.iter().copied()).collect()
+}
+
+/// The part of a bond between the words at its ends; of one that turns on its way what leads to its head.
+fn visible(sketch: &Sketch, own: usize, placed: &Placed, rooms: &[Room]) -> Option<(Point, Point)> {
+    let link = &sketch.links[own];
     let (a, b) = (placed.nodes[link.from], placed.nodes[link.to]);
+    if let Some(last) = placed.turns[own].last() {
+        let (part, _) = rooms[link.to].grown(GAP).cuts(*last, b)?;
+        return Some((*last, (last.0 + part * (b.0 - last.0), last.1 + part * (b.1 - last.1))));
+    }
     // The stroke of a slanting bond slants too, and needs more room at a corner.
     let ((x, y), _) = ways(a, b);
     let gap = GAP + 14.0 * (x * y).abs();
@@ -180,7 +197,13 @@ fn ways(a: Point, b: Point) -> (Point, Point) {
     (along, side)
 }
 
-fn bond(graph: &BondGraph, link: &Link, a: Point, b: Point, picture: &mut Picture) {
+fn bond(
+    graph: &BondGraph,
+    link: &Link,
+    (a, b): (Point, Point),
+    lead: Vec<Point>,
+    picture: &mut Picture,
+) {
     let (along, side) = ways(a, b);
     let ink = letters(link.domain).2;
     let line = Stroke::new(ink, 1.6);
@@ -190,8 +213,16 @@ fn bond(graph: &BondGraph, link: &Link, a: Point, b: Point, picture: &mut Pictur
         format!("bond {number}: {}, {} ({e}, {f})", graph.bond_name(link.bond), link.domain.name());
     let back = (b.0 - 10.0 * along.0 + 6.0 * side.0, b.1 - 10.0 * along.1 + 6.0 * side.1);
     picture.shapes.push(Shape::Line { points: vec![a, b, back], stroke: line, title });
+    // Where it comes from another row, its tail is at the beginning of the way to here.
+    let (tail, start) = match lead[..] {
+        [first, second, ..] => (first, ways(first, second).0),
+        _ => (a, along),
+    };
+    if lead.len() > 1 {
+        picture.path(lead, line);
+    }
     let Some(stroke) = link.stroke else { return };
-    let at = if stroke == Causal::AtFrom { a } else { b };
+    let (at, along) = if stroke == Causal::AtFrom { (tail, start) } else { (b, along) };
     let across = (-along.1 * 7.0, along.0 * 7.0);
     let ink = if link.dependent { Ink::Warning } else { ink };
     let (p, q) = ((at.0 - across.0, at.1 - across.1), (at.0 + across.0, at.1 + across.1));

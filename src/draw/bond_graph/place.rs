@@ -3,6 +3,7 @@
 
 use super::super::grid::{self, Block, Edge, Wish};
 use super::super::picture::{Point, Room, Words};
+use super::fold::fold;
 use super::paint::{group_words, node_words, room_of};
 use super::sketch::{NodeKind, Sketch};
 use std::collections::HashMap;
@@ -18,8 +19,10 @@ const COLUMN: f64 = 64.0;
 pub struct Placed {
     /// By node: the middle of its title.
     pub nodes: Vec<Point>,
-    /// By group: its box; nothing for the whole.
-    pub boxes: Vec<Option<Room>>,
+    /// By group: its box, or the pieces of it in several rows; nothing for the whole.
+    pub boxes: Vec<Vec<Room>>,
+    /// By bond that is drawn: where it turns on its way, if it leads to another row.
+    pub turns: Vec<Vec<Point>>,
     /// By node: its column and row.
     pub cells: Vec<grid::Cell>,
 }
@@ -82,22 +85,31 @@ pub fn place(sketch: &Sketch) -> Placed {
         edge = y[r] + down[r] + bottom[r] as f64 * PADDING.2 + BOND.1;
     }
     let frame = |(group, span): (usize, &Option<Span>)| {
-        let span = span.as_ref().filter(|_| group > 0)?;
+        let Some(span) = span.as_ref().filter(|_| group > 0) else { return vec![] };
         let rank = |of: &dyn Fn(&Span) -> i32| rank(sketch, &spans, group, of) as f64;
         let (l, r) = (span.left as usize, span.right as usize);
         let (t, b) = (span.top as usize, span.bottom as usize);
-        Some(Room {
+        vec![Room {
             left: x[l] - wide[l] - PADDING.0 * rank(&|s| s.left),
             right: x[r] + wide[r] + PADDING.0 * rank(&|s| s.right),
             top: y[t] - up[t] - PADDING.1 * rank(&|s| s.top),
             bottom: y[b] + down[b] + PADDING.2 * rank(&|s| s.bottom),
-        })
+        }]
     };
-    Placed {
+    let mut placed = Placed {
         nodes: cells.iter().map(|cell| (x[cell.0 as usize], y[cell.1 as usize])).collect(),
         boxes: spans.iter().enumerate().map(frame).collect(),
+        turns: vec![vec![]; sketch.links.len()],
         cells,
-    }
+    };
+    let edges: Vec<(f64, f64)> = (0..columns)
+        .map(|c| {
+            let pads = [left[c] as f64 * PADDING.0, right[c] as f64 * PADDING.0];
+            (x[c] - wide[c] - pads[0], x[c] + wide[c] + pads[1])
+        })
+        .collect();
+    fold(sketch, &mut placed, &edges, edge - BOND.1);
+    placed
 }
 
 /// The room of several words.

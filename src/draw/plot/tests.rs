@@ -76,6 +76,22 @@ fn a_lag_of_first_order_has_its_bode_plot() {
 }
 
 #[test]
+fn a_table_of_runs_is_drawn_as_points() {
+    let table = |l: [f64; 3]| {
+        let columns = vec![vec![0.0, 1.0, 2.0], l.to_vec(), vec![5.0, 7.0, 6.0]];
+        trace(&["run", "L", "peak"], &["", "", ""], columns)
+    };
+    let choice =
+        Choice { signals: vec!["peak".into()], over: Some("L".into()), ..Choice::default() };
+    // In order they are joined by a line, drawn by chance they are not.
+    for (l, line) in [([1.0, 2.0, 3.0], 3), ([2.0, 1.0, 3.0], 0)] {
+        let own = table(l);
+        let found = panels(&[Source { name: "sweep", trace: &own }], &choice).unwrap();
+        assert_eq!((found[0].marks.len(), found[0].curves[0].points.len()), (3, line));
+    }
+}
+
+#[test]
 fn a_million_points_are_drawn_by_what_can_be_seen_of_them() {
     let time: Vec<f64> = (0..1_000_000).map(|k| f64::from(k) * 1e-6).collect();
     let mut x: Vec<f64> = time.iter().map(|t| libm::sin(40.0 * t)).collect();

@@ -227,8 +227,25 @@ fn real(names: &Names, choice: &Choice, panels: &mut Vec<(String, Panel)>) {
         let pair = |k: usize| (trace.columns[over][k], trace.columns[column.at][k] * scale);
         rows.map(pair).collect()
     };
-    let runs = trace.runs().into_iter().map(points).collect();
+    let runs: Vec<Vec<Point>> = trace.runs().into_iter().map(points).collect();
+    let first = panel.curves.len();
     add(panel, names, runs);
+    if trace.names.first().is_some_and(|name| name == RUN) {
+        panel.curves[first..].iter_mut().for_each(|curve| table(curve, &mut panel.marks));
+    }
+}
+
+/// The first column of a table of runs, as `sweep` writes it.
+const RUN: &str = "run";
+
+/// A row of a table of runs is a point; a line joins them only where they stand in order.
+fn table(curve: &mut Curve, marks: &mut Vec<Mark>) {
+    let mark = |at: &Point| Mark { at: *at, ink: curve.ink, cross: false, name: String::new() };
+    marks.extend(curve.points.iter().map(mark));
+    let rises = curve.points.windows(2).all(|pair| pair[0].0 < pair[1].0);
+    if !rises {
+        curve.points.clear();
+    }
 }
 
 fn bode(names: &Names, imaginary: usize, choice: &Choice, panels: &mut Vec<(String, Panel)>) {
