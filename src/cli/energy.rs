@@ -51,14 +51,10 @@ pub struct Arguments {
 }
 
 /// Runs the model and shows its energies.
-pub fn run(arguments: Arguments, session: &mut Session) -> Exit {
-    match show(&arguments, session) {
-        Ok(()) => session.exit(),
-        Err(exit) => exit,
-    }
-}
-
-fn show(arguments: &Arguments, session: &mut Session) -> Result<(), Exit> {
+///
+/// # Errors
+/// The exit code, when the reason has been said.
+pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let form = |name: &Option<String>, session: &mut Session| match name {
         Some(name) => plot::form(Some(name), session),
         None => Ok(""),
@@ -140,7 +136,7 @@ fn peak(flow: &Flow, times: &[f64]) -> (f64, f64) {
 }
 
 /// Elements with what they have delivered, taken or gained, and their flows.
-fn elements<'a>(run: &'a Run) -> impl Iterator<Item = (&'a Flow, f64)> {
+fn elements(run: &Run) -> impl Iterator<Item = (&Flow, f64)> {
     // Both lists hold the elements whose bonds carry power, in the order of the file.
     run.flows.iter().zip(&run.energy.shares).map(|(flow, share)| (flow, share.energy))
 }

@@ -58,7 +58,8 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     };
     if let Some(name) = &arguments.plot {
         let form = plot::form(Some(name), session)?;
-        let title = format!("{}: poles{}", linear.name, zeros.as_ref().map_or("", |_| " and zeros"));
+        let title =
+            format!("{}: poles{}", linear.name, zeros.as_ref().map_or("", |_| " and zeros"));
         plot::show(&title, &map(linear, &poles, zeros.as_deref()), form, Some(name), session)?;
     }
     let text = match arguments.format.as_str() {

@@ -154,7 +154,11 @@ pub fn read(
         for signal in &reads.signals {
             found.tap(node, &inside(id, &graph.signals[signal.index()].name), true);
             if let (true, Some(from)) = (drawn, block_of[signal.index()]) {
-                let to = found.end(&title(node), BlockKind::Follower);
+                let name = match is_closed(homes.of(&vertex.name) as usize) {
+                    true => title(node),
+                    false => format!("{}: {}", vertex.kind, vertex.name),
+                };
+                let to = found.end(&name, BlockKind::Follower);
                 found.arrow(from, to);
             }
         }
@@ -278,6 +282,8 @@ impl Reader<'_> {
             }
             _ => self.law(id, id, 0),
         };
+        // Constants have been put in for what they are.
+        let text = text.replace("3.141592653589793", "pi");
         let home = graph.tree.get(graph.signals[id.index()].home as usize);
         match home.map(|home| home.name.as_str()) {
             None | Some("") => text,

@@ -63,7 +63,7 @@ fn cut(part: &Part, places: &[(f64, f64)]) -> Vec<Part> {
     while from + 1 < count {
         let far = |k: usize| places[k].0 - places[from].0;
         let free = || (from + 1..count - 1).filter(|k| !bridged(*k));
-        let fits = free().filter(|k| far(*k) <= PAGE).next_back();
+        let fits = free().rfind(|k| far(*k) <= PAGE);
         let rest = far(count - 1) <= PAGE;
         let to = if rest { None } else { fits.or_else(|| free().next()) };
         let to = to.unwrap_or(count - 1);
