@@ -17,7 +17,6 @@ mod signals;
 mod lines;
 mod rows;
 mod linear;
-mod energy;
 mod symbolic;
 mod transformed;
 mod reduced;

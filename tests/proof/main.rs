@@ -11,3 +11,4 @@ mod certificate_random;
 mod verify;
 mod mutations;
 mod random_in_ngspice;
+mod energy;
