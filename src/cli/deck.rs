@@ -1,5 +1,6 @@
 //! What the command line says about a netlist: parameters, columns, times, in the netlist's own spelling.
 
+use crate::analysis::sweep::measure::pieces;
 use crate::bond::elaborate::Overrides;
 use crate::circuit::{Analysis, Circuit};
 use crate::diagnostic::{Diagnostic, Severity};
@@ -112,21 +113,11 @@ pub fn observe(netlist: &mut Netlist, list: Option<&str>, d: &mut Vec<Diagnostic
 
 /// The items of a list with the names after `as`.
 fn items_of(list: &str) -> Vec<(String, Option<String>)> {
-    let mut items = vec![String::new()];
-    let (mut depth, mut quoted) = (0_i32, false);
-    for letter in list.chars() {
-        quoted ^= letter == '"';
-        depth += i32::from(letter == '(' && !quoted) - i32::from(letter == ')' && !quoted);
-        match items.last_mut() {
-            Some(item) if letter != ',' || depth > 0 || quoted => item.push(letter),
-            _ => items.push(String::new()),
-        }
-    }
     let split = |item: String| match item.split_once(" as ") {
         Some((text, name)) => (text.trim().into(), Some(name.trim().trim_matches('"').into())),
         None => (item.trim().to_string(), None),
     };
-    items.into_iter().filter(|item| !item.trim().is_empty()).map(split).collect()
+    pieces(list).into_iter().filter(|item| !item.is_empty()).map(split).collect()
 }
 
 /// Sets the end of the run and the output interval.

@@ -468,7 +468,7 @@ impl<'a> Run<'a> {
             std::mem::swap(&mut self.controls.left, &mut self.controls.right);
         }
         self.network.memories.forget(self.state.t);
-        self.weigh();
+        self.weigh_step();
         self.row_here()?;
         self.suit_limit(error, h);
         let report = self.rows.is_some() && self.network.statistics.accepted.is_multiple_of(64);

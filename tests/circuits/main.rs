@@ -15,3 +15,4 @@ mod expressions_in_ngspice;
 mod formats;
 mod reading;
 mod xyce;
+mod allocations;

@@ -16,6 +16,7 @@ mod events;
 mod signals;
 mod lines;
 mod rows;
+mod counters;
 mod linear;
 mod symbolic;
 mod transformed;

@@ -81,7 +81,7 @@ impl Wanted {
                     }
                 }
             })?;
-        let mut arguments = split(inside);
+        let mut arguments = pieces(inside);
         let item = if arguments.is_empty() { String::new() } else { arguments.remove(0) };
         if name.is_empty() || item.is_empty() || arguments.iter().any(String::is_empty) {
             return Err(form());
@@ -138,7 +138,7 @@ impl Wanted {
 }
 
 /// Pieces between the commas that stand in no brackets and no quotes.
-fn split(text: &str) -> Vec<String> {
+pub fn pieces(text: &str) -> Vec<String> {
     let mut pieces = vec![String::new()];
     let (mut depth, mut quoted) = (0_i32, false);
     for letter in text.chars() {

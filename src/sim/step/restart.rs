@@ -287,6 +287,14 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// Takes the values at the end of a step into the weights, which seldom changes any.
+    pub(super) fn weigh_step(&mut self) {
+        let grows = self.largest.iter().zip(&self.state.x).any(|(most, x)| x.abs() > *most);
+        if grows || self.index2 || self.was_index2 {
+            self.weigh();
+        }
+    }
+
     /// Takes the values of `state` into the weights.
     pub(super) fn weigh(&mut self) {
         let reltol = self.settings.reltol;

@@ -1,0 +1,47 @@
+//! Steps take no memory: a run of twice as many steps asks for no more of it.
+
+use bondspice::bond::elaborate::Overrides;
+use bondspice::cli::run::prepare;
+use bondspice::source::SourceMap;
+use bondspice::trace::Sink;
+
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn row(&mut self, _: &[f64]) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// How often a run asks for memory, and its steps.
+fn asked(deck: &str, until: &str) -> (u64, u64) {
+    let mut map = SourceMap::default();
+    let file = map.add("deck.cir", deck);
+    let overrides = Overrides { until: Some(until.into()), ..Overrides::default() };
+    let mut d = vec![];
+    let run = prepare(&mut map, file, &overrides, None, &mut d).unwrap_or_else(|| panic!("{d:#?}"));
+    let mut steps = 0;
+    let info = allocation_counter::measure(|| {
+        steps = run.go(&mut Nowhere).unwrap_or_else(|f| panic!("{:#?}", f.diagnostic)).accepted;
+    });
+    (info.count_total, steps)
+}
+
+#[test]
+fn steps_of_every_method_take_no_memory() {
+    const RC: &str = "a\nV1 in 0 SIN(0 5 1k)\nR1 in out 1k\nC1 out 0 1u\n";
+    const LAW: &str = "a\nV1 in 0 SIN(0 5 1k)\nB1 in out I={1e-3*tanh(v(in,out))}\nC1 out 0 1u\nC2 out 0 Q={1n*v(out)^3}\n";
+    const DIODE: &str = "a\nV1 in 0 SIN(0 5 1k)\nD1 in out d\nR1 out 0 1k\nC1 out 0 1u\n.model d D(Is=1e-14 Cjo=10p)\n";
+    const INDEX_2: &str = "a\nV1 in 0 SIN(0 5 1k)\nC1 in 0 1u\nR1 in out 1k\nC2 out 0 1u\n";
+    let circuits = [RC, LAW, DIODE, INDEX_2];
+    let methods = ["auto", "rodas5p", "rodas4", "trbdf2", "trap", "gear"];
+    for deck in circuits {
+        for method in methods {
+            let deck = format!("{deck}.tran 10u 1 0 20u\n.options method={method}\n");
+            let (few, some) = (asked(&deck, "10m"), asked(&deck, "20m"));
+            assert!(some.1 > few.1 + 200, "{method}: {} and {} steps", few.1, some.1);
+            let (steps, more) = (some.1 - few.1, some.0.saturating_sub(few.0));
+            assert_eq!(more, 0, "{more} times more in {steps} more steps:\n{deck}");
+        }
+    }
+}
