@@ -35,7 +35,7 @@ pub struct Linear {
     pub time: f64,
     /// The unknowns y; those that have a rate come first.
     pub unknowns: Vec<Quantity>,
-    /// What they are in the graph.
+    /// What they are in the graph; a circuit has none, and nothing of `gives`, `origins` and `slopes`.
     pub kinds: Vec<Unknown>,
     /// Number of unknowns that have a rate.
     pub states: usize,
@@ -80,7 +80,8 @@ pub struct Entry {
 }
 
 impl Entry {
-    fn number(value: f64) -> Entry {
+    /// A number.
+    pub fn number(value: f64) -> Entry {
         Entry { value, node: None }
     }
 }

@@ -11,6 +11,7 @@
 
 pub mod point;
 pub mod linear;
+pub mod circuit;
 pub mod state_space;
 pub mod poles;
 pub mod response;

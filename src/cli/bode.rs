@@ -60,8 +60,7 @@ pub struct Arguments {
 pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let arguments = &arguments;
     let (from, to) = (Some(arguments.from.as_str()), Some(arguments.to.as_str()));
-    let found = linear::linearise(&arguments.point, from, to, session)?;
-    let linear = &found.linear;
+    let linear = &linear::linearise(&arguments.point, from, to, session)?;
     if linear.inputs.len() != 1 {
         let message = "--from takes one variable";
         return Err(session.fail(Diagnostic::error("E0940", Span::NONE, message)));

@@ -1,8 +1,9 @@
 //! What the commands of linear analysis share: the point, the variables, the linear model.
 
-use super::flags::ModelFlags;
-use super::pipeline;
+use super::flags::{DeckFlags, ModelFlags};
+use super::pipeline::{self, Language};
 use super::session::{Exit, Session};
+use crate::analysis::circuit;
 use crate::analysis::linear::{self, Linear};
 use crate::analysis::point::{self, At};
 use crate::analysis::symbolic::symbols::name_values;
@@ -17,11 +18,14 @@ use crate::source::{FileId, Span};
 /// Flags of every command that linearises.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PointFlags {
-    /// The bond graph (.bg); - for standard input
+    /// The bond graph (.bg) or, for linearize, poles and bode, a netlist; - for standard input
     pub file: String,
     #[command(flatten)]
     /// What to change in it.
     pub model: ModelFlags,
+    #[command(flatten)]
+    /// How a netlist is read.
+    pub deck: DeckFlags,
     /// Where to linearise: start, rest (where all comes to rest, sources held as at the start), or a time of the run: 1.2s
     #[arg(long, value_name = "POINT", default_value = "start")]
     pub at: String,
@@ -44,17 +48,25 @@ impl WayFlags {
         self.from.is_some()
     }
 
-    /// Linearises a model, with names for the values at its elements or without; of a way one variable stands at each end.
+    /// Linearises a model or a netlist; of a way one variable stands at each end.
     ///
     /// # Errors
     /// The exit code, when the reason has been said.
-    pub fn linearise(
-        &self,
-        point: &PointFlags,
-        named: bool,
-        session: &mut Session,
-    ) -> Result<Linearised, Exit> {
-        let found = prepare(point, self.from.as_deref(), self.to.as_deref(), named, session)?;
+    pub fn linearise(&self, point: &PointFlags, session: &mut Session) -> Result<Linear, Exit> {
+        let linear = linearise(point, self.from.as_deref(), self.to.as_deref(), session)?;
+        if self.given() {
+            one_way(&linear, session)?;
+        }
+        Ok(linear)
+    }
+
+    /// Linearises a model with names for the values at its elements.
+    ///
+    /// # Errors
+    /// The exit code, when the reason has been said.
+    pub fn named(&self, point: &PointFlags, session: &mut Session) -> Result<Linearised, Exit> {
+        let (from, to) = (self.from.as_deref(), self.to.as_deref());
+        let found = linearise_named(point, from, to, session)?;
         if self.given() {
             one_way(&found.linear, session)?;
         }
@@ -84,7 +96,7 @@ pub struct Linearised {
     pub linear: Linear,
 }
 
-/// Reads, elaborates and linearises a model. `inputs` and `outputs` are lists of variables; without them the model's own.
+/// Reads and linearises a model or a netlist. `inputs` and `outputs` are lists of variables; without them its own.
 ///
 /// # Errors
 /// The exit code, when the reason has been said.
@@ -93,11 +105,35 @@ pub fn linearise(
     inputs: Option<&str>,
     outputs: Option<&str>,
     session: &mut Session,
-) -> Result<Linearised, Exit> {
-    prepare(flags, inputs, outputs, false, session)
+) -> Result<Linear, Exit> {
+    let at = at(&flags.at, session)?;
+    let mut overrides = flags.model.overrides(session)?;
+    flags.deck.add_to(&mut overrides, session)?;
+    let file = session.load(&flags.file)?;
+    if let Some(list) = outputs {
+        overrides.observe = Some(list.to_string());
+    }
+    if pipeline::language(&session.map, file) == Language::Bond {
+        return prepare(file, overrides, (at, false), inputs, session).map(|found| found.linear);
+    }
+    if let At::Time(_) = at {
+        let message = "a netlist is linearised at its operating point, not at a time of a run";
+        return Err(session.fail(Diagnostic::error("E0944", Span::NONE, message)));
+    }
+    let mut d = vec![];
+    let circuit = pipeline::deck(&mut session.map, file, &overrides, &mut d)
+        .and_then(|deck| deck.circuit(0, &[], None, &mut d));
+    session.say(d);
+    let Some(circuit) = circuit else { return Err(session.exit()) };
+    let names: Option<Vec<&str>> = inputs.map(|list| list.split(',').map(str::trim).collect());
+    match circuit::linearise(&circuit, names.as_deref()) {
+        Ok(linear) if session.exit() == Exit::Fine => Ok(linear),
+        Ok(_) => Err(session.exit()),
+        Err(error) => Err(session.fail(*error)),
+    }
 }
 
-/// The same of the model with names for the values that are written at its elements.
+/// The same of a model with names for the values that are written at its elements.
 ///
 /// # Errors
 /// The exit code, when the reason has been said.
@@ -107,24 +143,24 @@ pub fn linearise_named(
     outputs: Option<&str>,
     session: &mut Session,
 ) -> Result<Linearised, Exit> {
-    prepare(flags, inputs, outputs, true, session)
-}
-
-fn prepare(
-    flags: &PointFlags,
-    inputs: Option<&str>,
-    outputs: Option<&str>,
-    named: bool,
-    session: &mut Session,
-) -> Result<Linearised, Exit> {
     let at = at(&flags.at, session)?;
-    let (file, mut overrides) = flags.model.of(&flags.file, "linearised", session)?;
-    let inputs = inputs.map(|list| variables(session, file, &overrides, list)).transpose()?;
+    let (file, mut overrides) = flags.model.of(&flags.file, "told in symbols", session)?;
     if let Some(list) = outputs {
         overrides.observe = Some(list.to_string());
     }
+    prepare(file, overrides, (at, true), inputs, session)
+}
+
+fn prepare(
+    file: FileId,
+    overrides: Overrides,
+    how: (At, bool),
+    inputs: Option<&str>,
+    session: &mut Session,
+) -> Result<Linearised, Exit> {
+    let inputs = inputs.map(|list| variables(session, file, &overrides, list)).transpose()?;
     let mut d = vec![];
-    let found = find(session, file, &overrides, (at, named), inputs.as_deref(), &mut d);
+    let found = find(session, file, &overrides, how, inputs.as_deref(), &mut d);
     session.say(d);
     match (found, session.exit()) {
         (Some(found), Exit::Fine) => Ok(found),

@@ -49,8 +49,8 @@ pub struct Arguments {
 pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let arguments = &arguments;
     let (inputs, outputs) = (arguments.from.as_deref(), arguments.to.as_deref());
-    let found = linear::linearise(&arguments.point, inputs, outputs, session)?;
-    let space = state_space(&found.linear).map_err(|error| session.fail(*error))?;
+    let linear = linear::linearise(&arguments.point, inputs, outputs, session)?;
+    let space = state_space(&linear).map_err(|error| session.fail(*error))?;
     let to = arguments.output.as_deref();
     let ending = to.and_then(|to| Path::new(to).extension()).and_then(|e| e.to_str());
     let format = arguments.format.as_deref().unwrap_or(match ending {
@@ -60,10 +60,10 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
         _ => "text",
     });
     let text = match format {
-        "json" => format!("{:#}\n", export::to_json(&found.linear, &space)),
-        "matlab" => export::to_matlab(&found.linear, &space),
-        "python" => export::to_python(&found.linear, &space),
-        _ => to_text(&found.linear, &space),
+        "json" => format!("{:#}\n", export::to_json(&linear, &space)),
+        "matlab" => export::to_matlab(&linear, &space),
+        "python" => export::to_python(&linear, &space),
+        _ => to_text(&linear, &space),
     };
     write_text(to, &text, session)
 }

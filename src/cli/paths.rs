@@ -48,7 +48,7 @@ const LONGEST: usize = 100;
 /// The exit code, when the reason has been said.
 pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let arguments = &arguments;
-    let named = arguments.way.linearise(&arguments.point, true, session)?;
+    let named = arguments.way.named(&arguments.point, session)?;
     let (graph, linear) = (&named.graph, &named.linear);
     let states = (0..linear.states).filter(|k| linear.stores(*k)).count();
     let found = find(graph, linear, arguments.way.given());

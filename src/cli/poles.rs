@@ -49,8 +49,7 @@ pub struct Arguments {
 /// The exit code, when the reason has been said.
 pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
     let arguments = &arguments;
-    let found = arguments.way.linearise(&arguments.point, false, session)?;
-    let linear = &found.linear;
+    let linear = &arguments.way.linearise(&arguments.point, session)?;
     let poles = poles(linear).map_err(|error| session.fail(*error))?;
     let zeros = match arguments.way.given() {
         true => Some(zeros(linear, 0, 0).map_err(|error| session.fail(*error))?),

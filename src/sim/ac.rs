@@ -1,13 +1,12 @@
 //! `.ac`: phasors of the linearised circuit over frequencies.
 
-use super::analyses::{Column, Job, interrupted, no_circuit, unwritten};
-use super::compile::compile_linear;
+use super::analyses::{Column, Job, interrupted, unwritten};
 use super::explain::Failure;
 use super::linearise::{Linear, Pencil, singular};
 use super::phasor;
 use super::statistics::Statistics;
 use super::system::System;
-use crate::circuit::stamps::{self, Stamps, watched_name};
+use crate::circuit::stamps::{Stamps, watched_name};
 use crate::circuit::{Analysis, Circuit, Expr, Leaf, Output, Points, Probe};
 use crate::linear::Complex;
 use crate::trace::Sink;
@@ -68,11 +67,7 @@ impl Probed {
             });
         }
         let circuit = Circuit { outputs: reads(&probes), watched: vec![], ..circuit.clone() };
-        let mut d = vec![];
-        let stamps = stamps::stamp(&circuit, &mut d);
-        let system = stamps.and_then(|stamps| compile_linear(&stamps, &mut d));
-        let Some(system) = system else { return Err(no_circuit(d, &Statistics::default())) };
-        let linear = Linear::of(&system)?;
+        let (system, linear) = Linear::of_circuit(&circuit)?;
         let outputs = outputs.iter().map(|output| output.expr.clone()).collect();
         Ok(Probed { system, linear, probes, outputs })
     }

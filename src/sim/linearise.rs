@@ -8,6 +8,8 @@
 //! non-linear circuit obey it near the operating point, a linear circuit everywhere. Switches stay in the states that
 //! the operating point finds.
 
+use super::analyses::no_circuit;
+use super::compile::compile_linear;
 use super::explain::{self, Failure, FailureKind, Moment, failure};
 use super::methods::Work;
 use super::network::Network;
@@ -15,8 +17,8 @@ use super::op;
 use super::statistics::Statistics;
 use super::step::{self, past};
 use super::system::System;
-use crate::circuit::stamps::{MemoryKind, Unknown};
-use crate::circuit::{DeviceId, Parts};
+use crate::circuit::stamps::{self, MemoryKind, Unknown};
+use crate::circuit::{Circuit, DeviceId, Parts};
 use crate::diagnostic::Diagnostic;
 use crate::linear::{Complex, Field, Lu, Pattern, Singular};
 use crate::source::Span;
@@ -30,6 +32,8 @@ pub struct Linear {
     pub conductances: Vec<(u32, u32, f64)>,
     /// Entries of C.
     pub storages: Vec<(u32, u32, f64)>,
+    /// What C is made of: s·C·x is the sum of the rates of all charges, each in its equations.
+    pub charges: Vec<Charge>,
     /// Delays.
     pub delays: Vec<Delay>,
     /// The independent sources, and what a unit of each adds to the right-hand side.
@@ -49,6 +53,19 @@ pub struct Delay {
     pub by: f64,
     /// Entries of D.
     pub entries: Vec<(u32, u32, f64)>,
+}
+
+/// A charge or a flux.
+#[derive(Clone, Debug)]
+pub struct Charge {
+    /// Whose.
+    pub device: DeviceId,
+    /// Its value at the operating point.
+    pub value: f64,
+    /// The equations that its rate enters, with factors.
+    pub into: Vec<(u32, f64)>,
+    /// Its slopes by unknowns.
+    pub slopes: Vec<(u32, f64)>,
 }
 
 /// An independent source.
@@ -71,6 +88,8 @@ pub struct Reading {
     pub terms: Vec<(u32, f64)>,
     /// Its row of R.
     pub rates: Vec<(u32, f64)>,
+    /// The same as charges, whose rates it reads.
+    pub charges: Vec<(u32, f64)>,
 }
 
 impl Linear {
@@ -83,6 +102,19 @@ impl Linear {
         // What is linear is the same everywhere.
         let (network, state) = rest(system, !system.is_linear() || !system.modes.is_empty())?;
         Linear::at(network, &state.x)
+    }
+
+    /// Linearises a circuit at its operating point, for its own outputs.
+    ///
+    /// # Errors
+    /// When it cannot be compiled, has no operating point, or holds samples at instants.
+    pub fn of_circuit(circuit: &Circuit) -> Result<(System, Linear), Failure> {
+        let mut d = vec![];
+        let stamps = stamps::stamp(circuit, &mut d);
+        let system = stamps.and_then(|stamps| compile_linear(&stamps, &mut d));
+        let Some(system) = system else { return Err(no_circuit(d, &Statistics::default())) };
+        let linear = Linear::of(&system)?;
+        Ok((system, linear))
     }
 
     /// Linearises a network at values of its unknowns.
@@ -106,16 +138,29 @@ impl Linear {
             parts: source.parts,
             into: source.into.clone(),
         });
+        let mut charges: Vec<Charge> = charges(&network, x);
+        for (charge, unknown, slope) in network.storage_slopes() {
+            charges[charge as usize].slopes.push((unknown, slope));
+        }
         let outputs = network.output_slopes(x).into_iter().zip(&system.outputs);
-        let outputs =
-            outputs.map(|((terms, rates), name)| Reading { name: name.to_string(), terms, rates });
+        let outputs: Vec<Reading> = outputs
+            .map(|((terms, own), name)| {
+                let rate = |(k, factor): &(u32, f64)| {
+                    let slopes = charges[*k as usize].slopes.iter();
+                    slopes.map(|(x, slope)| (*x, factor * slope)).collect::<Vec<_>>()
+                };
+                let rates = own.iter().flat_map(rate).collect();
+                Reading { name: name.to_string(), terms, rates, charges: own }
+            })
+            .collect();
         Ok(Linear {
             unknowns: system.unknowns.clone(),
             conductances,
             storages,
+            charges,
             delays,
             sources: sources.collect(),
-            outputs: outputs.collect(),
+            outputs,
             point: x.to_vec(),
             statistics: network.statistics,
         })
@@ -185,6 +230,18 @@ impl Reading {
         };
         sum(&self.terms) + s * sum(&self.rates)
     }
+}
+
+/// The charges of a network without their slopes.
+fn charges(network: &Network, x: &[f64]) -> Vec<Charge> {
+    let system = network.system;
+    let mut values = vec![0.0; system.charges()];
+    network.charges(x, &mut values);
+    let one = |(k, device): (usize, &DeviceId)| {
+        let into = system.rates.row(k).map(|(row, sign)| (row as u32, sign)).collect();
+        Charge { device: *device, value: values[k], into, slopes: vec![] }
+    };
+    system.charge_devices.iter().enumerate().map(one).collect()
 }
 
 /// The matrix of a linear circuit at any s, its pattern found once.

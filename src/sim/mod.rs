@@ -43,7 +43,7 @@ pub use crate::circuit::stamps::UnknownId;
 pub use analyses::{ANALYSES, Job};
 pub use compile::compile;
 pub use explain::{Failure, FailureKind};
-pub use linearise::Linear;
+pub use linearise::{Charge, Input as Source, Linear};
 pub use methods::{METHODS, Method};
 pub use settings::{Interval, OPTIONS, OptionRow, Progress, Settings, Side, Tolerance};
 pub use statistics::{Rejected, Statistics};

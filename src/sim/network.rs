@@ -632,7 +632,7 @@ impl<'a> Network<'a> {
         (0..self.system.memories.len()).map(row).collect()
     }
 
-    /// Of each output column the slopes by unknowns, and those by rates in terms of unknowns.
+    /// Of each output column the slopes by unknowns, and those by the rates of charges.
     #[allow(clippy::type_complexity)]
     pub fn output_slopes(&mut self, x: &[f64]) -> Vec<(Vec<(u32, f64)>, Vec<(u32, f64)>)> {
         self.set_inputs(x, 0.0);
@@ -648,7 +648,7 @@ impl<'a> Network<'a> {
                 if input < n {
                     terms.push((input as u32, slope));
                 } else if input >= first {
-                    rates.extend(self.charge_slopes(input - first).map(|(k, c)| (k, slope * c)));
+                    rates.push(((input - first) as u32, slope));
                 }
             }
             found.push((terms, rates));

@@ -7,7 +7,7 @@
 
 use bondspice::analysis::paths::{flow, mason, sink, source};
 use bondspice::analysis::symbolic::transfer::transfer;
-use bondspice::cli::flags::ModelFlags;
+use bondspice::cli::flags::{DeckFlags, ModelFlags};
 use bondspice::cli::linear::{Linearised, PointFlags, linearise_named};
 use bondspice::cli::session::{Global, Session};
 use bondspice::linear::{Complex, Field};
@@ -21,7 +21,12 @@ fn file(model: &str) -> PathBuf {
 
 fn named(model: &str, from: &str, to: &str) -> Linearised {
     let file = file(model).to_str().unwrap().to_string();
-    let flags = PointFlags { file, model: ModelFlags::default(), at: "start".into() };
+    let flags = PointFlags {
+        file,
+        model: ModelFlags::default(),
+        deck: DeckFlags::default(),
+        at: "start".into(),
+    };
     let mut session = Session::new(Global { quiet: true, ..Global::default() });
     let found = linearise_named(&flags, Some(from), Some(to), &mut session);
     found.unwrap_or_else(|exit| panic!("{model}: {exit:?} {:?}", session.said))

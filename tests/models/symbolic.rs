@@ -4,7 +4,7 @@
 
 use bondspice::analysis::symbolic::print::{to_json, to_latex, to_text};
 use bondspice::analysis::symbolic::transfer::{Transfer, transfer};
-use bondspice::cli::flags::ModelFlags;
+use bondspice::cli::flags::{DeckFlags, ModelFlags};
 use bondspice::cli::linear::{PointFlags, linearise_named};
 use bondspice::cli::session::{Global, Session};
 use bondspice::expr::polynomial::Polynomial;
@@ -14,7 +14,12 @@ use std::path::Path;
 fn of(model: &str, at: &str, from: &str, to: &str) -> Transfer {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
     let file = file.to_str().unwrap().to_string();
-    let flags = PointFlags { file, model: ModelFlags::default(), at: at.into() };
+    let flags = PointFlags {
+        file,
+        model: ModelFlags::default(),
+        deck: DeckFlags::default(),
+        at: at.into(),
+    };
     let mut session = Session::new(Global { quiet: true, ..Global::default() });
     let found = linearise_named(&flags, Some(from), Some(to), &mut session);
     let found = found.unwrap_or_else(|exit| panic!("{model}: {exit:?} {:?}", session.said));

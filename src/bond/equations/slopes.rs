@@ -9,7 +9,7 @@ use crate::bond::graph::BondGraph;
 use crate::expr::{Dag, NodeId};
 
 /// Partial derivatives of rates, algebraic rows and some more formulas.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Slopes {
     /// All operations.
     pub dag: Dag,

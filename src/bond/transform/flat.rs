@@ -321,11 +321,14 @@ impl Writer<'_> {
         let (what, bond) = (letter(variable), self.graph.bond(id));
         let law = |end: End| &self.graph.vertex(end.vertex).law;
         let ends = [bond.from, bond.to];
-        let common = ends.iter().find(|end| match (law(**end), variable) {
-            (Law::Zero, Power::Effort) | (Law::One, Power::Flow) => true,
-            (Law::Dissipator(_) | Law::Store { .. } | Law::Rate { .. }, Power::Effort) => true,
-            (Law::Source { detector: false, .. }, _) => true,
-            _ => false,
+        let common = ends.iter().find(|end| {
+            matches!(
+                (law(**end), variable),
+                (Law::Zero, Power::Effort)
+                    | (Law::One, Power::Flow)
+                    | (Law::Dissipator(_) | Law::Store { .. } | Law::Rate { .. }, Power::Effort)
+                    | (Law::Source { detector: false, .. }, _)
+            )
         });
         let into =
             matches!(law(bond.to), Law::Dissipator(_) | Law::Store { .. } | Law::Rate { .. });

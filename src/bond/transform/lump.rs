@@ -434,12 +434,12 @@ impl Lines<'_> {
                     read("e", &b.name, format!("({minus}{half})"));
                 }
             }
-            if a.kind.ends_with('C') {
-                if let (Some((mean, own)), Some((value, expr))) = (mean, self.source.value(*x)) {
-                    let value = super::factor::at(&value, expr.map_or(2, level), 1);
-                    let mean = super::factor::at(mean, *own, 1);
-                    read("q", &a.name, format!("({value}*{mean} + q({}))", a.name));
-                }
+            if a.kind.ends_with('C')
+                && let (Some((mean, own)), Some((value, expr))) = (mean, self.source.value(*x))
+            {
+                let value = super::factor::at(&value, expr.map_or(2, level), 1);
+                let mean = super::factor::at(mean, *own, 1);
+                read("q", &a.name, format!("({value}*{mean} + q({}))", a.name));
             }
             if !matches!(a.kind, "0" | "1") && a.bonds.len() == 1 {
                 read("f", &a.name, format!("f({})", a.name));

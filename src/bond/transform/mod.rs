@@ -229,7 +229,7 @@ impl Source {
                 syntax::Value::Expr(expr) => Some((self.slice(expr.span).into(), Some(expr))),
                 _ => None,
             },
-            None if declared.arguments.iter().flatten().all(|a| is_initial(a)) => {
+            None if declared.arguments.iter().flatten().all(is_initial) => {
                 Some((self.graph.vertex(id).name.clone(), None))
             }
             None => None,

@@ -210,7 +210,7 @@ fn bond_of(source: &Source, from: &ChainEnd, to: &ChainEnd) -> Option<BondId> {
 
 /// Sees to it that everything that is left is declared somewhere: declarations alone where no chain is left, and the
 /// statement written anew where a declaration has to move to.
-fn declare(source: &Source, plan: &Plan, anew: &mut Vec<Anew>) {
+fn declare(source: &Source, plan: &Plan, anew: &mut [Anew]) {
     let statements = &source.syntax.statements;
     let home = |span: Span| statements.iter().position(|s| inside(span, s.span));
     let mut lost: Vec<(usize, String)> = vec![];
