@@ -20,7 +20,8 @@ Columns: frequency, then of each variable its real and imaginary part over that 
 degrees. Without --start and --stop a decade beyond the poles to either side.
 
 Example: bondspice bode models/rlc.bg --from 'e(U)' --to 'f(mesh)' -o rlc.csv
-         bondspice bode models/eha_one_line.bg --at 2s --from alpha --to 'f(armature)' --start 1Hz --stop 1kHz";
+         bondspice bode models/eha_one_line.bg --at 2s --from alpha --to 'f(armature)' --start 1Hz --stop 1kHz
+         bondspice bode deck.cir --from V1 --to 'v(out)'";
 
 /// Its flags.
 #[derive(clap::Args)]

@@ -15,13 +15,14 @@ pub const ABOUT: &str =
 
 /// An example for the help.
 pub const EXAMPLE: &str = "\
-Inputs are the model's inputs and sources, outputs what it observes, unless --from and --to name others. A variable
+Inputs are the model's inputs and sources (of a netlist its sources), outputs what it observes, unless --from and --to name others. A variable
 of the model that is made an input is imposed: what determines it otherwise is put aside. States are what storages hold
 (q, p) and what signals integrate.
 
 Example: bondspice linearize models/dc_motor_load.bg
          bondspice linearize models/eha_one_line.bg --at 2s --from x_ref --to 'x, f(shaft) in rpm' -o eha.py
-         bondspice linearize models/rlc.bg -o rlc.m";
+         bondspice linearize models/rlc.bg -o rlc.m
+         bondspice linearize deck.cir --from V1 --to 'v(out), i(l1)'";
 
 /// Its flags.
 #[derive(clap::Args)]

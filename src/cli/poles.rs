@@ -23,7 +23,8 @@ to --to; imposing a variable with --from puts aside what determines it otherwise
 
 Example: bondspice poles models/eha_one_line.bg --at 2s
          bondspice poles models/rlc.bg --from 'e(U)' --to 'f(mesh)'
-         bondspice poles models/eha_one_line.bg --from x_ref --to x --plot poles.svg";
+         bondspice poles models/eha_one_line.bg --from x_ref --to x --plot poles.svg
+         bondspice poles deck.cir --from V1 --to 'v(out)'";
 
 /// Its flags.
 #[derive(clap::Args)]

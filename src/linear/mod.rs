@@ -7,6 +7,7 @@
 //! in an order of minimum degree (T. A. Davis, *Direct Methods for Sparse Linear Systems*, 2006).
 
 mod choose;
+mod components;
 mod degree;
 mod field;
 mod gilbert;
@@ -21,6 +22,7 @@ pub mod symmetric;
 #[cfg(test)]
 mod tests;
 
+pub use components::components;
 pub use field::{Complex, Field, Prime, Prime61, Prime62};
 pub use lu::{Lu, SMALL, Trouble, backward_error};
 pub use matching::{Matching, maximum_matching};

@@ -67,7 +67,7 @@ impl Probed {
             });
         }
         let circuit = Circuit { outputs: reads(&probes), watched: vec![], ..circuit.clone() };
-        let (system, linear) = Linear::of_circuit(&circuit)?;
+        let (system, linear) = Linear::of_circuit(&circuit, false)?;
         let outputs = outputs.iter().map(|output| output.expr.clone()).collect();
         Ok(Probed { system, linear, probes, outputs })
     }

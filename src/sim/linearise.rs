@@ -104,16 +104,19 @@ impl Linear {
         Linear::at(network, &state.x)
     }
 
-    /// Linearises a circuit at its operating point, for its own outputs.
+    /// Linearises a circuit at its operating point, for its own outputs. That of a circuit that is linear is sought only
+    /// where it is `wanted`.
     ///
     /// # Errors
     /// When it cannot be compiled, has no operating point, or holds samples at instants.
-    pub fn of_circuit(circuit: &Circuit) -> Result<(System, Linear), Failure> {
+    pub fn of_circuit(circuit: &Circuit, wanted: bool) -> Result<(System, Linear), Failure> {
         let mut d = vec![];
         let stamps = stamps::stamp(circuit, &mut d);
         let system = stamps.and_then(|stamps| compile_linear(&stamps, &mut d));
         let Some(system) = system else { return Err(no_circuit(d, &Statistics::default())) };
-        let linear = Linear::of(&system)?;
+        let (network, state) =
+            rest(&system, wanted || !system.is_linear() || !system.modes.is_empty())?;
+        let linear = Linear::at(network, &state.x)?;
         Ok((system, linear))
     }
 

@@ -210,61 +210,11 @@ fn read_if(
     });
 }
 
-/// Sets of variables that determine each other (Tarjan's strongly connected components, 1972, without recursion).
+/// Sets of variables that determine each other.
 fn components(follows: &Follows) -> Vec<Vec<u32>> {
-    const NEW: u32 = u32::MAX;
     let count = follows.starts.len() - 1;
-    let mut index = vec![NEW; count];
-    let mut low = vec![0u32; count];
-    let mut on_stack = vec![false; count];
-    let mut stack = Vec::new();
-    let mut calls: Vec<(u32, u32)> = Vec::new();
-    let mut next_index = 0;
-    let mut found = Vec::new();
-    for root in 0..count as u32 {
-        if index[root as usize] != NEW {
-            continue;
-        }
-        calls.push((root, 0));
-        while let Some((variable, at)) = calls.last_mut() {
-            let v = *variable as usize;
-            if *at == 0 && index[v] == NEW {
-                index[v] = next_index;
-                low[v] = next_index;
-                next_index += 1;
-                stack.push(*variable);
-                on_stack[v] = true;
-            }
-            if let Some(&next) = follows.of(v).get(*at as usize) {
-                *at += 1;
-                let w = next as usize;
-                if index[w] == NEW {
-                    calls.push((next, 0));
-                } else if on_stack[w] {
-                    low[v] = low[v].min(index[w]);
-                }
-                continue;
-            }
-            calls.pop();
-            if let Some(&(parent, _)) = calls.last() {
-                low[parent as usize] = low[parent as usize].min(low[v]);
-            }
-            if low[v] == index[v] {
-                let mut component = Vec::new();
-                while let Some(w) = stack.pop() {
-                    on_stack[w as usize] = false;
-                    component.push(w);
-                    if w as usize == v {
-                        break;
-                    }
-                }
-                if component.len() > 1 || follows.of(v).contains(&(v as u32)) {
-                    component.sort_unstable();
-                    found.push(component);
-                }
-            }
-        }
-    }
+    let mut found = crate::linear::components(count, &|v| follows.of(v));
+    found.retain(|set| set.len() > 1 || follows.of(set[0] as usize).contains(&set[0]));
     found.sort();
     found
 }

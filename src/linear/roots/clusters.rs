@@ -180,7 +180,7 @@ fn uncertainty(pencil: &mut Pencil, z: Complex) -> Option<(f64, f64)> {
 }
 
 /// Sorts by size and makes conjugate roots exactly so; a multiple root that has no partner is real.
-fn pair(found: &mut Vec<Root>) {
+pub fn pair(found: &mut Vec<Root>) {
     found.sort_by(|a, b| size(a.at).total_cmp(&size(b.at)).then(b.at.im.total_cmp(&a.at.im)));
     let mut left: Vec<Root> = std::mem::take(found);
     while !left.is_empty() {

@@ -12,7 +12,9 @@
 //!
 //! A root of multiplicity k is determined by numbers of 16 figures to 16/k figures only, but the mean of the k roots
 //! that it falls apart into is exact: roots that lie within that distance are told as one, at their mean (`clusters`).
+//! Parts that do not act on each other are solved apart (`blocks`).
 
+mod blocks;
 mod clusters;
 mod count;
 mod dual;
@@ -70,7 +72,30 @@ pub fn finite_roots(
     storage: &[(u32, u32, f64)],
     go_on: &dyn Fn() -> bool,
 ) -> Result<Vec<Root>, Trouble> {
-    let mut pencil = Pencil::new(n, fixed, storage);
+    // Equal blocks have equal roots.
+    let mut known: Vec<(blocks::Block, Vec<Root>)> = vec![];
+    let mut all = vec![];
+    for block in blocks::blocks(n, fixed, storage) {
+        if let Some((_, roots)) = known.iter().find(|(other, _)| *other == block) {
+            all.extend(roots);
+            continue;
+        }
+        let roots = roots_of(&block, go_on)?;
+        all.extend(&roots);
+        known.push((block, roots));
+    }
+    let mut all = blocks::merge(all);
+    clusters::pair(&mut all);
+    Ok(all)
+}
+
+/// The roots of one block.
+fn roots_of(block: &blocks::Block, go_on: &dyn Fn() -> bool) -> Result<Vec<Root>, Trouble> {
+    if block.storage.is_empty() && block.n == 1 {
+        let sum: f64 = block.fixed.iter().map(|(_, _, value)| value).sum();
+        return if sum == 0.0 { Err(Trouble::Singular) } else { Ok(vec![]) };
+    }
+    let mut pencil = Pencil::new(block.n, &block.fixed, &block.storage);
     let count = count::degree(&pencil, go_on)?;
     let start = start::guesses(&mut pencil, count);
     let zeros = count - start.len();
