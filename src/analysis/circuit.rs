@@ -23,7 +23,16 @@ use crate::source::Span;
 /// # Errors
 /// When there is no such source, no operating point, or no linear system of finite order.
 pub fn linearise(circuit: &Circuit, inputs: Option<&[&str]>) -> Result<Linear, Box<Diagnostic>> {
-    let (system, found) = sim::Linear::of_circuit(circuit).map_err(|failure| failure.diagnostic)?;
+    // A linear circuit is the same everywhere: where it has no operating point, its point is not known.
+    let of = |wanted| sim::Linear::of_circuit(circuit, wanted);
+    let (system, found) = of(true)
+        .or_else(|_| {
+            let (system, mut found) = of(false)?;
+            found.charges.iter_mut().for_each(|charge| charge.value = f64::NAN);
+            found.point.fill(f64::NAN);
+            Ok((system, found))
+        })
+        .map_err(|failure: sim::Failure| failure.diagnostic)?;
     if found.delays.iter().any(|delay| !delay.entries.is_empty()) {
         let message = "a circuit with delays or lines has no linear system of finite order";
         let help = "put sections of L and C in the place of a line, or use `.ac`";
