@@ -156,9 +156,7 @@ fn go(
             };
             // As deep as the main thread: trees are walked by recursion.
             let builder = std::thread::Builder::new().stack_size(super::STACK);
-            if let Err(error) = builder.spawn_scoped(scope, work) {
-                return Err(error);
-            }
+            builder.spawn_scoped(scope, work)?;
         }
         drop(sender);
         let mut waiting = BTreeMap::new();

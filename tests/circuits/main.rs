@@ -7,7 +7,6 @@ mod small_signal;
 mod analyses;
 mod fourier;
 mod poles;
-mod linear_theory;
 mod sensitivity;
 mod measures;
 mod difficult_decks;

@@ -3,6 +3,8 @@
 //! Tolerances: 1e-9 of the root against closed forms, of multiple roots too; 1e-6 of the root against ngspice 39, whose
 //! search ends there (its thermal voltage differs in the seventh figure).
 
+mod linear_theory;
+
 use crate::small_signal::{errors, has_ngspice, ngspice, printed, run};
 use bondspice::trace::Trace;
 
