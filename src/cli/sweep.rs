@@ -107,38 +107,54 @@ fn sweep(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         (Some(name), Some(shard)) => Some(shard.file(name)),
         (name, _) => name.clone(),
     };
-    let whole = Shard { number: 1, count: 1 };
-    let runs: Vec<u64> = shard.unwrap_or(whole).runs(sweep.space.runs()).collect();
+    let part = Part { shard: shard.unwrap_or(Shard::WHOLE), total: sweep.space.runs() };
     let runner = Runner::new(&sweep, arguments.traces.as_deref(), session)?;
     let mut d = vec![];
     // Whatever is wrong with all runs is said once, by the first of them.
-    let first = runs.first().copied().unwrap_or(0);
+    let first = part.run(0).unwrap_or(0);
     let header = runner.header(first, &mut session.map, &mut d);
     session.say(d);
     let Some(header) = header else { return Err(session.exit()) };
     let mut table = Table::open(output.as_deref(), &header, session)?;
     let done = match arguments.resume {
-        true => table.resume(&runs, &sweep.space, session)?,
+        true => table.resume(part, &sweep.space, session)?,
         false => 0,
     };
     table.begin(session)?;
-    go(arguments, &runner, &runs[done..], &mut table, session)
+    go(arguments, &runner, (part, done), &mut table, session)
+}
+
+/// The runs that are made here.
+#[derive(Clone, Copy)]
+struct Part {
+    shard: Shard,
+    total: u64,
+}
+
+impl Part {
+    fn run(self, at: u64) -> Option<u64> {
+        self.shard.run(at, self.total)
+    }
+
+    fn runs(self) -> u64 {
+        self.shard.runs(self.total)
+    }
 }
 
 /// Makes the runs, and writes their rows in order.
 fn go(
     arguments: &Arguments,
     runner: &Runner,
-    runs: &[u64],
+    (part, done): (Part, u64),
     table: &mut Table,
     session: &mut Session,
 ) -> Result<Exit, Exit> {
     let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = arguments.threads.map_or_else(processors, |threads| threads as usize);
-    let threads = threads.min(runs.len()).max(1);
+    let threads = threads.min((part.runs() - done) as usize).max(1);
     let stop = watch::stop_flag();
     let bar = Bar::new(session.global.quiet);
-    let next = AtomicU64::new(0);
+    let next = AtomicU64::new(done);
     let (sender, receiver) = mpsc::sync_channel(4 * threads);
     let mut failed: Vec<(u64, Diagnostic)> = vec![];
     let map = session.map.clone();
@@ -148,8 +164,8 @@ fn go(
             let work = move || {
                 while !stop.load(Ordering::Relaxed) {
                     let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(run) = runs.get(at as usize) else { return };
-                    if sender.send((at, runner.run(*run, map, stop))).is_err() {
+                    let Some(run) = part.run(at) else { return };
+                    if sender.send((at, runner.run(run, map, stop))).is_err() {
                         return;
                     }
                 }
@@ -160,7 +176,7 @@ fn go(
         }
         drop(sender);
         let mut waiting = BTreeMap::new();
-        let mut due = 0;
+        let mut due = done;
         for (at, outcome) in receiver {
             waiting.insert(at, outcome);
             while let Some(outcome) = waiting.remove(&due) {
@@ -169,11 +185,11 @@ fn go(
                 table.row(&row)?;
                 due += 1;
                 if let Some(bar) = &bar {
-                    bar.show(due as f64 / runs.len() as f64);
+                    bar.show(due as f64 / part.runs() as f64);
                 }
             }
         }
-        Ok(due as usize == runs.len())
+        Ok(due == part.runs())
     });
     if let Some(bar) = bar {
         bar.clear();

@@ -26,6 +26,9 @@ const SCHEDULERS: &[Scheduler] = &[
 ];
 
 impl Shard {
+    /// All of it.
+    pub const WHOLE: Shard = Shard { number: 1, count: 1 };
+
     /// From `K/N`.
     ///
     /// # Errors
@@ -54,9 +57,15 @@ impl Shard {
         })
     }
 
-    /// Its runs of all.
-    pub fn runs(self, total: u64) -> impl Iterator<Item = u64> {
-        (self.number - 1..total).step_by(self.count as usize)
+    /// Its run at a place, of so many of all.
+    pub fn run(self, at: u64, total: u64) -> Option<u64> {
+        let run = self.count.checked_mul(at)?.checked_add(self.number - 1)?;
+        (run < total).then_some(run)
+    }
+
+    /// How many runs it has, of so many of all.
+    pub fn runs(self, total: u64) -> u64 {
+        (total + self.count - self.number) / self.count
     }
 
     /// A file's name for this part of it: `out.csv` becomes `out.2of4.csv`.
@@ -75,10 +84,14 @@ mod tests {
 
     #[test]
     fn parts_are_disjoint_and_make_the_whole() {
-        let mut all: Vec<u64> =
-            (1..=4).flat_map(|number| Shard { number, count: 4 }.runs(11)).collect();
+        let mut all: Vec<u64> = (1..=4)
+            .map(|number| Shard { number, count: 4 })
+            .flat_map(|shard| (0..shard.runs(11)).map(move |at| shard.run(at, 11).unwrap()))
+            .collect();
         all.sort_unstable();
         assert_eq!(all, (0..11).collect::<Vec<_>>());
+        assert_eq!(Shard { number: 4, count: 4 }.run(2, 11), None);
+        assert_eq!(Shard { number: 4, count: 4 }.runs(3), 0);
         assert_eq!(Shard::parse("2/4"), Ok(Shard { number: 2, count: 4 }));
         for wrong in ["0/4", "5/4", "1", "a/b", "1/0"] {
             assert!(Shard::parse(wrong).is_err(), "{wrong}");

@@ -1,5 +1,6 @@
 //! The table of runs: written in order while runs end, taken up again, put together from parts.
 
+use super::Part;
 use super::runner::Row;
 use crate::analysis::sweep::Space;
 use crate::cli::session::{Exit, Session};
@@ -44,10 +45,10 @@ impl Table {
     /// The exit code: what it has made is of another sweep.
     pub fn resume(
         &mut self,
-        runs: &[u64],
+        part: Part,
         space: &Space,
         session: &mut Session,
-    ) -> Result<usize, Exit> {
+    ) -> Result<u64, Exit> {
         let Some(name) = self.partial() else { return Ok(0) };
         if !std::path::Path::new(&name).exists() {
             return Ok(0);
@@ -68,8 +69,9 @@ impl Table {
             }
             _ => {}
         }
+        let runs = (0..).map_while(|at| part.run(at));
         for (line, run) in lines[1..].iter().zip(runs) {
-            let settings = space.settings(*run);
+            let settings = space.settings(run);
             let own: Vec<String> = std::iter::once(run.to_string())
                 .chain(settings.iter().map(|setting| shown(setting.value)))
                 .collect();
@@ -77,11 +79,11 @@ impl Table {
                 return foreign(format!("its run {} has other values", line[0]), session);
             }
         }
-        if lines.len() - 1 > runs.len() {
+        if lines.len() as u64 - 1 > part.runs() {
             return foreign("it has more runs".into(), session);
         }
         self.kept = lines[1..].to_vec();
-        Ok(self.kept.len())
+        Ok(self.kept.len() as u64)
     }
 
     /// Begins to write.
