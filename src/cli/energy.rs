@@ -8,10 +8,8 @@ use super::run::endless;
 use super::session::{Exit, Session};
 use super::table::{Table, short};
 use crate::diagnostic::Diagnostic;
-use crate::draw::balance::{self, Share};
-use crate::draw::picture::Ink;
+use crate::draw::balance::{self, Share, shares};
 use crate::draw::plot::flows;
-use crate::second::energy::Role;
 use crate::second::flows::Flow;
 use crate::second::{self, Run};
 use crate::source::Span;
@@ -68,7 +66,7 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
         plot::show(&title, &panels, plotted, Some(file), session)?;
     }
     if let Some(file) = &arguments.sankey {
-        let [into, out] = shares(&run, &report);
+        let [into, out] = shares(&report);
         let words = |size: f64| format!("{} J", short(size));
         let until = run.columns[0].last().copied().unwrap_or(0.0);
         let title = format!("{name}: energy over {} s", short(until));
@@ -141,35 +139,13 @@ fn elements(run: &Run) -> impl Iterator<Item = (&Flow, f64)> {
     run.flows.iter().zip(&run.energy.shares).map(|(flow, share)| (flow, share.energy))
 }
 
-/// What comes in and what becomes of it: each element on the side on which its amount is positive.
-fn shares(run: &Run, report: &EnergyReport) -> [Vec<Share>; 2] {
-    let mut sides = [vec![], vec![]];
-    for (flow, energy) in elements(run) {
-        let ink = Ink::Curve(match flow.role {
-            Role::Source => 0,
-            Role::Dissipated => 1,
-            Role::Stored => 2,
-            Role::Modulated => 3,
-        });
-        let into = (flow.role == Role::Source) == (energy > 0.0);
-        let side = usize::from(!into);
-        sides[side].push(Share { name: flow.name.clone(), size: energy.abs(), ink });
-    }
-    if report.jumps != 0.0 {
-        let side = usize::from(report.jumps < 0.0);
-        let (name, ink) = ("jumps".to_string(), Ink::Curve(7));
-        sides[side].push(Share { name, size: report.jumps.abs(), ink });
-    }
-    sides
-}
-
 fn to_text(run: &Run, report: &EnergyReport) -> String {
     let times = &run.columns[0];
     let mut table =
         Table::new(&["element", "role", "energy J", "of input %", "peak power W", "at s"]);
     // In parts of all that comes in, as in the bands.
     let sum = |side: &[Share]| side.iter().map(|share| share.size).sum::<f64>();
-    let [into, out] = shares(run, report);
+    let [into, out] = shares(report);
     let all = sum(&into).max(sum(&out));
     let mut rows: Vec<(&Flow, f64)> = elements(run).collect();
     rows.sort_by(|a, b| {

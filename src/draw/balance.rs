@@ -2,6 +2,8 @@
 //! diagram of M. H. P. R. Sankey, *The thermal efficiency of steam engines*, 1898).
 
 use super::picture::{Anchor, Ink, Picture, Point, Room, Shape, Words};
+use crate::second::energy::Role;
+use crate::verify::EnergyReport;
 
 /// One band.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +27,28 @@ const LINE: f64 = 15.0;
 const LITTLE: f64 = 2e-3;
 /// The size of letters.
 const SIZE: f64 = 11.0;
+
+/// What comes in and what becomes of it: each element of a balance on the side on which its amount is positive.
+pub fn shares(balance: &EnergyReport) -> [Vec<Share>; 2] {
+    let mut sides = [vec![], vec![]];
+    for element in &balance.elements {
+        let source = element.role == Role::Source.name();
+        let ink = Ink::Curve(match element.role {
+            _ if source => 0,
+            role if role == Role::Dissipated.name() => 1,
+            role if role == Role::Stored.name() => 2,
+            _ => 3,
+        });
+        let (name, size) = (element.name.clone(), element.energy.abs());
+        sides[usize::from(source != (element.energy > 0.0))].push(Share { name, size, ink });
+    }
+    if balance.jumps != 0.0 {
+        let (name, ink) = ("jumps".to_string(), Ink::Curve(7));
+        let side = usize::from(balance.jumps < 0.0);
+        sides[side].push(Share { name, size: balance.jumps.abs(), ink });
+    }
+    sides
+}
 
 /// Draws what comes in and what becomes of it; `words` says how large a share is.
 pub fn paint(title: &str, [into, out]: [&[Share]; 2], words: &dyn Fn(f64) -> String) -> Picture {
@@ -80,7 +104,7 @@ pub fn paint(title: &str, [into, out]: [&[Share]; 2], words: &dyn Fn(f64) -> Str
         picture.words(Words::new((middle, high + 20.0), says, SIZE, Ink::Warning));
     }
     let all = picture.shapes.iter().map(Shape::room).reduce(|a, b| a.with(&b));
-    if let Some(all) = all {
+    if let (Some(all), false) = (all, title.is_empty()) {
         let mut words = Words::new((all.left, all.top - 18.0), title, 13.0, Ink::Plain);
         (words.anchor, words.bold) = (Anchor::Start, true);
         picture.words(words);

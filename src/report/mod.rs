@@ -5,6 +5,7 @@
 
 mod data;
 
+use crate::draw::balance;
 use crate::draw::picture::Picture;
 use crate::draw::svg::{self, escape};
 use crate::trace::Trace;
@@ -188,7 +189,15 @@ fn energy(contents: &Contents) -> String {
     let Some(energy) = contents.proof.and_then(|proof| proof.energy.as_ref()) else {
         return "<p class=\"faint\">No balance: it comes with the certificate.</p>\n".to_string();
     };
-    let mut out = String::from("<table>\n<tr><th>part</th><th>energy</th></tr>\n");
+    let mut out = String::new();
+    let [into, out_of] = balance::shares(energy);
+    if !into.is_empty() && energy.holds() {
+        let words = |size: f64| format!("{size:.4} J");
+        let bands = balance::paint("", [&into, &out_of], &words);
+        let _ =
+            writeln!(out, "<div class=\"picture\">{}</div>", svg::inside(&bands, "", &|_| None));
+    }
+    out += "<table>\n<tr><th>part</th><th>energy</th></tr>\n";
     for (name, value) in [
         ("delivered by sources", energy.delivered),
         ("dissipated", energy.dissipated),
