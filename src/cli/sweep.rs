@@ -34,10 +34,10 @@ The result is a table of runs as CSV: run, parameters in SI, measures. It has th
 A sweep that was interrupted leaves OUT.partial, and --resume goes on from there. In an array of a batch system (Slurm, SGE, \
 LSF) each task makes its own part, and --merge puts the parts together.
 
-Examples: bondspice sweep models/eha_one_line.bg --vary 'L=1mH..3mH:5' --measure 'peak=max(f(armature))'
-          bondspice sweep plan.toml -o out.csv
-          bondspice sweep plan.toml -o out.csv --shard 2/4
-          bondspice sweep --merge out.*of4.csv -o out.csv";
+Example: bondspice sweep models/eha_one_line.bg --vary 'L=1mH..3mH:5' --measure 'peak=max(f(armature))'
+         bondspice sweep plan.toml -o out.csv
+         bondspice sweep plan.toml -o out.csv --shard 2/4
+         bondspice sweep --merge out.*of4.csv -o out.csv";
 
 /// Its flags.
 #[derive(clap::Args)]

@@ -255,8 +255,8 @@ pub const EXAMPLES: &[(&str, &str, &str)] = examples! {
     "E1103" "left_out_and_read.bg"
     "E1104" "all_left_out.bg"
     "N1106" "laid_open.bg"
-    "E1200" "sweep_plan_no_toml.expected"
-    "E1201" "sweep_plan_other_keys.expected"
+    "E1200" "plan_no_toml.toml"
+    "E1201" "plan_other_keys.toml"
     "E1202" "sweep_of_steps.expected"
     "E1203" "sweep_without_measure.expected"
     "E1204" "sweep_parts_overlap.expected"
@@ -273,6 +273,7 @@ macro_rules! beside {
 /// Files that examples read, each by the name that they call it by.
 pub const BESIDE: &[(&str, &str)] = beside! {
     "with/divider.inc"
+    "with/swept.cir"
     "with/torn.csv"
     "with/words.dat"
 };

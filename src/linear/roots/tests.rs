@@ -82,3 +82,11 @@ fn many_roots() {
     };
     near(&found, &(1..=n).map(exact).collect::<Vec<_>>(), 1e-11);
 }
+
+#[test]
+fn a_determinant_of_rounding_alone_has_no_roots() {
+    // (1 + s)·4e-16: exactly of degree 1, and 0 to the last digit at every s.
+    let fixed = [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 1.0), (1, 1, 2.0 + 2.0 * f64::EPSILON)];
+    let storage = [(0, 0, 1.0), (1, 0, 1.0)];
+    assert!(matches!(finite_roots(2, &fixed, &storage, &|| true), Err(Trouble::Singular)));
+}
