@@ -16,7 +16,7 @@ const MOST_HALVED: u32 = 8;
 
 /// No line is asked to be straighter than this part of a column's range, however small `reltol` is: rows would be many
 /// for what nobody sees.
-const STRAIGHTEST: f64 = 1e-6;
+const STRAIGHTEST: f64 = 1e-7;
 
 /// Columns that are measured are straight between rows within this part of what others are.
 const MEASURED: f64 = 0.1;

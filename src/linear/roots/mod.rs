@@ -99,7 +99,10 @@ fn roots_of(block: &blocks::Block, go_on: &dyn Fn() -> bool) -> Result<Vec<Root>
     let count = count::degree(&pencil, go_on)?;
     // Exactly the determinant has a degree; where it is 0 to the last digit wherever it is asked, nothing is known of it.
     let probes = [1e-2, 1.7, 33.0, 2.1e4].map(|radius| Complex::new(0.6 * radius, 0.8 * radius));
-    if count > 0 && probes.iter().all(|s| pencil.slope(*s).is_none()) {
+    let rounding = count > 0 && probes.iter().all(|s| pencil.slope(*s).is_none());
+    // Pivots are chosen where the search begins.
+    pencil.factors = None;
+    if rounding {
         return Err(Trouble::Singular);
     }
     let start = start::guesses(&mut pencil, count);

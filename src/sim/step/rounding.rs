@@ -11,6 +11,8 @@ use crate::quantity::random;
 const ROUNDINGS: f64 = 8.0;
 /// in directions of which so many are tried.
 const TRIES: u64 = 3;
+/// No current and no voltage has a floor above these, in A and V: what is less well known than that is no rounding.
+const MOST: [f64; 2] = [1e-9, 1e-6];
 /// It is asked after so many steps whose error matters.
 const SEEN_AGAIN: u32 = 32;
 /// Errors below this part of the tolerance do not.
@@ -52,6 +54,8 @@ impl Run<'_> {
             return;
         }
         let Run { network, state, work, rounding, .. } = self;
+        // A step that was cut may have asked the laws far out.
+        network.evaluate(&state.x, state.t);
         network.term_sizes(&state.x, state.t, &mut work.x);
         rounding.floors.fill(0.0);
         for seed in 0..TRIES {
@@ -60,8 +64,11 @@ impl Run<'_> {
                 *turned = sign * ROUNDINGS * f64::EPSILON * size;
             }
             network.solve_dynamic(&mut work.right);
-            for (floor, moved) in rounding.floors.iter_mut().zip(&work.right) {
-                *floor = floor.max(moved.abs());
+            let unknowns = &network.system.unknowns;
+            for ((floor, moved), unknown) in
+                rounding.floors.iter_mut().zip(&work.right).zip(unknowns)
+            {
+                *floor = floor.max(moved.abs()).min(MOST[usize::from(unknown.voltage)]);
             }
         }
         self.weigh();
