@@ -155,9 +155,12 @@ fn shown(value: f64) -> String {
 }
 
 fn line_of(cells: &[String]) -> String {
-    let cells: Vec<String> = cells.iter().map(|cell| crate::trace::csv::quoted(cell)).collect();
     // An empty cell is a value that there is none of, not a name.
-    cells.join(",").replace("\"\"", "") + "\n"
+    let cell = |cell: &String| match cell.is_empty() {
+        true => String::new(),
+        false => crate::trace::csv::quoted(cell),
+    };
+    cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n"
 }
 
 /// Cells of a table's lines.
@@ -225,4 +228,15 @@ pub fn merge(parts: &[String], output: Option<&str>, session: &mut Session) -> R
     let text: String = all.map(|line| line_of(line)).collect();
     crate::cli::output::write_text(output, &text, session)?;
     Ok(session.exit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_read_back_as_they_were_written() {
+        let cells = ["0", "", "max(x as \"a, b\")", "1e-3", ""].map(String::from);
+        assert_eq!(lines_of(&line_of(&cells)), [cells.to_vec()]);
+    }
 }
