@@ -85,9 +85,7 @@ pub fn run(arguments: Arguments, session: &mut Session) -> Result<(), Exit> {
 
 /// Runs the second route with what flows.
 fn simulate(flags: &ReportFlags, session: &mut Session) -> Result<(String, Run), Exit> {
-    let overrides = flags.model.overrides(session)?;
-    let file = session.load(&flags.file)?;
-    pipeline::require_bond(session, file, "asked for its energies")?;
+    let (file, overrides) = flags.model.of(&flags.file, "asked for its energies", session)?;
     let mut d = vec![];
     let model = pipeline::model(&mut session.map, file, &overrides, &mut d);
     let found = model.and_then(|model| {

@@ -12,7 +12,7 @@ use crate::bond::causality::Causality;
 use crate::bond::elaborate::Overrides;
 use crate::bond::graph::{BondGraph, Observation};
 use crate::diagnostic::{Diagnostic, has_errors};
-use crate::quantity::Unit;
+use crate::quantity::{Unit, number_and_unit};
 use crate::source::{FileId, Span};
 
 /// Flags of every command that linearises.
@@ -244,23 +244,16 @@ fn at(text: &str, session: &mut Session) -> Result<At, Exit> {
 /// # Errors
 /// The exit code, when the reason has been said.
 pub fn quantity(text: &str, unit: &str, takes: &str, session: &mut Session) -> Result<f64, Exit> {
-    let digits = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-');
-    let mut end = text.find(|c| !digits(c)).unwrap_or(text.len());
-    if text[end..].starts_with(['e', 'E']) {
-        let more = text[end + 1..].find(|c| !digits(c)).map_or(text.len(), |at| end + 1 + at);
-        end = if more > end + 1 { more } else { end };
-    }
-    let own = text[end..].trim();
-    let number = text[..end].parse::<f64>().ok();
+    let read = number_and_unit(text);
+    let own = read.map_or("", |(_, own)| own);
     let wanted = Unit::parse(unit).ok();
-    let read = match own {
-        "" => number,
+    let read = read.and_then(|(number, own)| match own {
+        "" => Some(number),
         own => Unit::parse(own)
             .ok()
             .filter(|own| wanted.as_ref().is_some_and(|wanted| wanted.dimension == own.dimension))
-            .zip(number)
-            .map(|(own, number)| own.to_si(number)),
-    };
+            .map(|own| own.to_si(number)),
+    });
     let turns = if unit == "Hz" && own.contains("rad") { std::f64::consts::TAU } else { 1.0 };
     match read.filter(|value| value.is_finite() && *value >= 0.0) {
         Some(value) => Ok(value / turns),

@@ -17,6 +17,7 @@ use crate::diagnostic::{Diagnostic, Severity};
 use crate::sim::FailureKind;
 use crate::source::{FileId, Span};
 use crate::trace::Trace;
+use crate::trace::compare::{Settings, compare};
 use serde_json::{Value, json};
 
 /// What it does, in a line.
@@ -208,18 +209,10 @@ fn leave_out(work: &mut Work, name: &str) -> Result<(), Trouble> {
     work.change(&|source| without(source, source.find(name)?))
 }
 
-/// By column of the second, the largest difference in parts of the range that it has in the first.
+/// By column that the second has, too, the largest difference in parts of the range that it has in the first.
 fn errors(whole: &Trace, less: &Trace) -> Vec<(String, f64)> {
-    let columns = less.names.iter().zip(&less.columns).skip(1);
-    let one = |(name, ours): (&String, &Vec<f64>)| {
-        let theirs = whole.column(name)?;
-        let low = theirs.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = theirs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let most = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let error = if most == 0.0 { 0.0 } else { most / (high - low) };
-        Some((name.clone(), error))
-    };
-    columns.filter_map(one).collect()
+    let found = compare(less, whole, &Settings::default());
+    found.signals.into_iter().map(|signal| (signal.name, signal.max)).collect()
 }
 
 fn worst(errors: &[(String, f64)]) -> Option<&(String, f64)> {

@@ -197,8 +197,7 @@ fn go(
     let whole = written.map_err(|error| table.unwritable(&error, session))?;
     say_failures(failed, session);
     if !whole {
-        let kept = table.keep();
-        let hint = kept.map_or(String::new(), |name| {
+        let hint = table.partial().map_or(String::new(), |name| {
             format!("; `{name}` holds the runs so far, --resume goes on")
         });
         session.remark(&format!("interrupted{hint}"));

@@ -210,6 +210,11 @@ pub struct Room {
 }
 
 impl Room {
+    /// The smallest that holds a line.
+    pub fn along(a: Point, b: Point) -> Room {
+        Room { left: a.0.min(b.0), top: a.1.min(b.1), right: a.0.max(b.0), bottom: a.1.max(b.1) }
+    }
+
     /// Whether two have more than an edge in common.
     pub fn overlaps(&self, other: &Room) -> bool {
         self.left < other.right

@@ -14,4 +14,4 @@ pub use domain::{DOMAINS, Domain, DomainRow};
 pub use nearest::{did_you_mean, is_slip, nearest};
 pub use relations::{Disagreement, Formula, Relations};
 pub use symbols::{PREFIXES, SYMBOLS, Symbol, is_unit_name};
-pub use unit::{Unit, UnitError, scan_unit};
+pub use unit::{Unit, UnitError, number_and_unit, scan_unit};

@@ -147,6 +147,19 @@ fn inverse(factor: f64) -> Option<f64> {
     (factor < 1.0 && whole < 1e15 && 1.0 / whole == factor).then_some(whole)
 }
 
+/// A finite number, and what stands behind it: `2.5 mH`.
+pub fn number_and_unit(text: &str) -> Option<(f64, &str)> {
+    let digits = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-');
+    let mut end = text.find(|c| !digits(c)).unwrap_or(text.len());
+    // The `e` of `2 eV` begins a unit.
+    if text[end..].starts_with(['e', 'E']) {
+        let more = text[end + 1..].find(|c| !digits(c)).map_or(text.len(), |at| end + 1 + at);
+        end = if more > end + 1 { more } else { end };
+    }
+    let number = text[..end].parse::<f64>().ok().filter(|number| number.is_finite())?;
+    Some((number, text[end..].trim()))
+}
+
 impl Unit {
     /// A number of this unit in SI: 1.7 mH is the double nearest to 0.0017.
     pub fn to_si(&self, value: f64) -> f64 {
@@ -394,5 +407,21 @@ mod tests {
         let deep = format!("{}m{}", "(".repeat(10_000), ")".repeat(10_000));
         assert!(Unit::parse(&deep).is_err());
         assert_eq!(scan_unit(&format!("m/{deep}")), 1);
+    }
+
+    #[test]
+    fn numbers_end_where_their_units_begin() {
+        for (text, number, unit) in [
+            ("2.5 mH", 2.5, "mH"),
+            ("-1e-3", -1e-3, ""),
+            ("1E3rad/s", 1e3, "rad/s"),
+            ("2 eV", 2.0, "eV"),
+            ("2eV", 2.0, "eV"),
+        ] {
+            assert_eq!(number_and_unit(text), Some((number, unit)), "{text}");
+        }
+        for none in ["", "mH", "inf", "1e400", "1.2.3 s", "--1"] {
+            assert_eq!(number_and_unit(none), None, "{none}");
+        }
     }
 }

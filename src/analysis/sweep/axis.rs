@@ -4,15 +4,15 @@
 //! L=1mH,2mH,5mH      L=1mH..3mH:5      L=1mH..100mH:7:log      L=normal(2mH, 0.1mH)      L=uniform(1mH, 3mH)
 //! ```
 
-use crate::quantity::random;
+use crate::quantity::{number_and_unit, random};
 
-/// A parameter and its values.
+/// A parameter and its values, over texts or numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct Axis<T = String> {
     /// The parameter.
     pub name: String,
     /// Its values.
-    pub forms: Forms<String>,
+    pub forms: Forms<T>,
 }
 
 /// The forms of values, over texts or numbers.
@@ -53,15 +53,8 @@ impl Reading {
     /// That it is none.
     pub fn of(text: &str, factor: &dyn Fn(&str) -> Option<f64>) -> Result<Reading, String> {
         let text = text.trim();
-        // The longest beginning that is a number: the `e` of `2e` may begin a unit.
-        let end = (1..=text.len())
-            .rev()
-            .filter(|end| text.is_char_boundary(*end))
-            .find(|end| text[..*end].parse::<f64>().is_ok_and(f64::is_finite));
         let none = || format!("`{text}` is no number with a unit");
-        let end = end.ok_or_else(none)?;
-        let number = text[..end].parse().map_err(|_| none())?;
-        let unit = text[end..].trim();
+        let (number, unit) = number_and_unit(text).ok_or_else(none)?;
         let factor = if unit.is_empty() { Some(1.0) } else { factor(unit) };
         Ok(Reading { number, unit: unit.into(), factor: factor.ok_or_else(none)? })
     }
@@ -199,41 +192,34 @@ impl<T> Forms<T> {
 }
 
 impl Forms<Reading> {
-    /// The values of a list or a range.
-    pub(super) fn stated(self) -> Vec<Reading> {
+    /// How many values a grid has of it, at least 1.
+    pub fn count(&self) -> u64 {
         match self {
-            Forms::List(values) => values,
-            Forms::Range { from, to, count, log } => {
-                let at = |k: u64| {
-                    if k == 0 {
-                        return from.clone();
-                    }
-                    if k + 1 == count {
-                        return to.clone();
-                    }
-                    let part = k as f64 / (count - 1) as f64;
-                    from.with(match log {
-                        true => from.number * libm::pow(to.number / from.number, part),
-                        false => from.number + part * (to.number - from.number),
-                    })
-                };
-                (0..count).map(at).collect()
-            }
-            Forms::Normal { .. } | Forms::Uniform { .. } => vec![],
+            Forms::List(values) => values.len().max(1) as u64,
+            Forms::Range { count, .. } => *count,
+            Forms::Normal { .. } | Forms::Uniform { .. } => 1,
         }
     }
 
-    /// The value of a run; that of a list or range is its first.
-    pub(super) fn sample(&self, seed: u64, run: u64) -> Reading {
+    /// The value at a place of the grid; a random one is that of a run.
+    pub fn value(&self, at: u64, seed: u64, run: u64) -> Reading {
         match self {
+            Forms::List(values) => values[at as usize].clone(),
+            Forms::Range { from, .. } if at == 0 => from.clone(),
+            Forms::Range { to, count, .. } if at + 1 == *count => to.clone(),
+            Forms::Range { from, to, count, log } => {
+                let part = at as f64 / (count - 1) as f64;
+                from.with(match log {
+                    true => from.number * libm::pow(to.number / from.number, part),
+                    false => from.number + part * (to.number - from.number),
+                })
+            }
             Forms::Normal { mean, deviation } => {
                 mean.with(mean.number + deviation.number * random::normal(seed, run))
             }
             Forms::Uniform { low, high } => {
                 low.with(low.number + (high.number - low.number) * random::fraction(seed, run))
             }
-            Forms::Range { from, .. } => from.clone(),
-            Forms::List(values) => values[0].clone(),
         }
     }
 }
@@ -273,7 +259,7 @@ mod tests {
         let read = |text: &str| Reading::of(text, &|_| None);
         let values = |text: &str| -> Vec<f64> {
             let forms = Forms::parse(text).unwrap().resolve(&read).unwrap();
-            forms.stated().iter().map(Reading::si).collect()
+            (0..forms.count()).map(|at| forms.value(at, 0, 0).si()).collect()
         };
         assert_eq!(values("1..3:5"), [1.0, 1.5, 2.0, 2.5, 3.0]);
         assert_eq!(values("1..3:1"), [1.0]);

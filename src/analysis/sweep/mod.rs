@@ -19,22 +19,9 @@ pub type Read<'a> = &'a dyn Fn(&str) -> Result<Reading, String>;
 /// All runs of a sweep.
 #[derive(Clone, Debug)]
 pub struct Space {
-    axes: Vec<Resolved>,
+    axes: Vec<Axis<Reading>>,
     samples: u64,
     seed: u64,
-}
-
-/// An axis whose values are numbers.
-#[derive(Clone, Debug)]
-struct Resolved {
-    name: String,
-    values: Values,
-}
-
-#[derive(Clone, Debug)]
-enum Values {
-    Stated(Vec<Reading>),
-    Random(Forms<Reading>),
 }
 
 /// What a run sets: a name, its value in SI, and the value as the model's language writes it.
@@ -68,11 +55,7 @@ impl Space {
                 return Err((Some(at), format!("`{}` is varied twice", axis.name)));
             }
             let forms = axis.forms.resolve(read).map_err(|why| (Some(at), why))?;
-            let values = match forms.is_random() {
-                true => Values::Random(forms),
-                false => Values::Stated(forms.stated()),
-            };
-            resolved.push(Resolved { name: axis.name.clone(), values });
+            resolved.push(Axis { name: axis.name.clone(), forms });
         }
         let random = axes.iter().find(|axis| axis.forms.is_random());
         let samples = match (random, runs) {
@@ -96,10 +79,7 @@ impl Space {
     }
 
     fn count(&self) -> Option<u64> {
-        let lengths = self.axes.iter().map(|axis| match &axis.values {
-            Values::Stated(values) => values.len() as u64,
-            Values::Random(_) => 1,
-        });
+        let lengths = self.axes.iter().map(|axis| axis.forms.count());
         let total = lengths.chain([self.samples]).try_fold(1u64, u64::checked_mul);
         total.filter(|total| *total <= MOST_RUNS)
     }
@@ -118,16 +98,10 @@ impl Space {
     pub fn settings(&self, run: u64) -> Vec<Setting> {
         let mut point = run / self.samples.max(1);
         let mut settings: Vec<Setting> = vec![];
-        for Resolved { name, values } in self.axes.iter().rev() {
-            let reading = match values {
-                Values::Stated(values) => {
-                    let length = values.len().max(1) as u64;
-                    let reading = values[(point % length) as usize].clone();
-                    point /= length;
-                    reading
-                }
-                Values::Random(forms) => forms.sample(random::below(self.seed, name), run),
-            };
+        for Axis { name, forms } in self.axes.iter().rev() {
+            let length = forms.count();
+            let reading = forms.value(point % length, random::below(self.seed, name), run);
+            point /= length;
             let (value, text) = (reading.si(), reading.text());
             settings.push(Setting { name: name.clone(), value, text });
         }

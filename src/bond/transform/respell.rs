@@ -14,7 +14,7 @@ pub fn visit(expr: &Expr, see: &mut dyn FnMut(&Leaf, Span) -> bool) {
             }
             match leaf {
                 Leaf::Call(Call { rows, .. }) => {
-                    rows.iter().flatten().for_each(|argument| argument_in(argument, see));
+                    rows.iter().flatten().for_each(|argument| visit_argument(argument, see));
                 }
                 Leaf::Sum(sum) => visit(&sum.term, see),
                 Leaf::Quantity(..) | Leaf::Name(_) => {}
@@ -34,17 +34,13 @@ pub fn visit(expr: &Expr, see: &mut dyn FnMut(&Leaf, Span) -> bool) {
     }
 }
 
-fn argument_in(argument: &Argument, see: &mut dyn FnMut(&Leaf, Span) -> bool) {
+/// The same for the value of an argument.
+pub fn visit_argument(argument: &Argument, see: &mut dyn FnMut(&Leaf, Span) -> bool) {
     match &argument.value {
         Value::Expr(expr) => visit(expr, see),
         Value::Matrix(rows) => rows.iter().flatten().for_each(|expr| visit(expr, see)),
         Value::Bond(..) | Value::Text(_) => {}
     }
-}
-
-/// The same for the value of an argument of an element.
-pub fn visit_argument(argument: &Argument, see: &mut dyn FnMut(&Leaf, Span) -> bool) {
-    argument_in(argument, see);
 }
 
 /// A text from `start` on with pieces of it replaced.

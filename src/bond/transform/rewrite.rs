@@ -50,6 +50,9 @@ pub fn apply(source: &Source, plan: &Plan) -> Result<String, Trouble> {
         }
     }
     declare(source, plan, &mut anew);
+    let replaced: Vec<Span> =
+        anew.iter().map(|one| source.syntax.statements[one.at].span).collect();
+    let anew_at = |span: Span| replaced.iter().any(|whole| inside(span, *whole));
     let mut written = HashSet::new();
     let mut edits: Vec<(Span, String)> = vec![];
     let mut first = None;
@@ -57,14 +60,12 @@ pub fn apply(source: &Source, plan: &Plan) -> Result<String, Trouble> {
         let span = source.syntax.statements[statement.at].span;
         let mut lines = comments_in(source, span);
         for run in &statement.runs {
-            lines.push(print(source, plan, run, &readings, &mut written)?);
+            lines.push(print(source, plan, run, &readings, &anew_at, &mut written)?);
         }
         first = first.or(Some(statement.at));
         edits.push((span, lines.join("\n")));
     }
     // Declarations in statements that stay as they are.
-    let replaced: Vec<Span> = edits.iter().map(|(span, _)| *span).collect();
-    let anew_at = |span: Span| replaced.iter().any(|whole| inside(span, *whole));
     let mut laws: Vec<_> = plan.laws.keys().collect();
     laws.sort_unstable();
     for id in laws {
@@ -244,12 +245,16 @@ fn print(
     plan: &Plan,
     run: &Run,
     readings: &[(Span, String)],
+    anew_at: &dyn Fn(Span) -> bool,
     written: &mut HashSet<String>,
 ) -> Result<String, Trouble> {
     let mut tip = |tip: &Tip| -> Result<String, Trouble> {
         let new = plan.through.values().find(|(_, name)| *name == tip.name);
         let declares = match source.names.get(&tip.name) {
-            Some(id) => source.own(*id) && declared_anew(source, plan, *id),
+            Some(id) => {
+                let declared = source.declared.get(id);
+                source.own(*id) && declared.is_some_and(|declared| anew_at(declared.span))
+            }
             None => new.is_some(),
         };
         if !declares || !written.insert(tip.name.clone()) {
@@ -279,17 +284,6 @@ fn print(
         text += &tip(one)?;
     }
     Ok(text)
-}
-
-/// Whether the declaration of an element stands in a statement that is written anew.
-fn declared_anew(source: &Source, plan: &Plan, id: VertexId) -> bool {
-    let Some(declared) = source.declared.get(&id) else { return false };
-    source.syntax.statements.iter().any(|statement| match &statement.kind {
-        StatementKind::Chain(chain) => {
-            inside(declared.span, statement.span) && rechain(source, plan, chain).is_some()
-        }
-        _ => false,
-    })
 }
 
 /// `I:J(J/la^2)`

@@ -35,7 +35,8 @@ impl Table {
         Ok(Table { name, header: header.to_vec(), kept: vec![], to: None })
     }
 
-    fn partial(&self) -> Option<String> {
+    /// Where the runs so far are kept.
+    pub fn partial(&self) -> Option<String> {
         self.name.as_ref().map(|name| format!("{name}.partial"))
     }
 
@@ -125,11 +126,6 @@ impl Table {
     /// Says that it cannot be written.
     pub fn unwritable(&self, error: &io::Error, session: &mut Session) -> Exit {
         session.unwritable(self.name.as_deref().unwrap_or("<stdout>"), error)
-    }
-
-    /// Where the runs so far are kept.
-    pub fn keep(&self) -> Option<String> {
-        self.partial()
     }
 
     /// Gives the file its name.

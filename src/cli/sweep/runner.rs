@@ -112,9 +112,6 @@ impl<'a> Runner<'a> {
             let own = overrides.observe.take().filter(|_| self.traces.is_some());
             let items = own.into_iter().chain(self.items.iter().cloned());
             overrides.observe = Some(items.collect::<Vec<_>>().join(", "));
-        } else if self.traces.is_none() && !self.bond {
-            // The cards of the netlist measure; nobody looks at its columns.
-            overrides.observe = None;
         }
         let before = d.len();
         let mut complete =

@@ -202,13 +202,7 @@ pub(super) fn tap(
     let (from, to) = if tap.into { (far, near) } else { (near, far) };
     let title = if tap.into { "follows" } else { "measured" };
     arrow(from, to, format!("{title} {}", tap.text), picture);
-    let line = Room {
-        left: near.0.min(far.0),
-        top: near.1.min(far.1),
-        right: near.0.max(far.0),
-        bottom: near.1.max(far.1),
-    };
-    let taken = words.room().with(&line);
+    let taken = words.room().with(&Room::along(near, far));
     picture.words(words);
     taken
 }

@@ -285,14 +285,8 @@ impl Labels {
         let others = self.taken.iter().enumerate().filter(|(k, _)| *k != node);
         let over = others.filter(|(_, room)| room.cuts(a, b).is_some()).count();
         let edges = self.edges.iter().filter(|(p, q)| words.cuts(*p, *q).is_some()).count();
-        let along = Room {
-            left: a.0.min(b.0),
-            top: a.1.min(b.1),
-            right: a.0.max(b.0),
-            bottom: a.1.max(b.1),
-        };
         // Near another line is as bad as over it.
-        let near = along.grown(3.0);
+        let near = Room::along(a, b).grown(3.0);
         let lines = self.lines.iter().flatten().chain(&self.edges);
         0.02 * edges as f64
             + 20.0 * (over + lines.filter(|(p, q)| near.cuts(*p, *q).is_some()).count()) as f64

@@ -60,14 +60,7 @@ pub(super) fn guides(
     // Marks are named beside the axes, not on them.
     for guide in panel.guides.iter().filter(|guide| guide.strong) {
         for pair in guide.points.windows(2) {
-            let (a, b) = (at(&pair[0]), at(&pair[1]));
-            let room = Room {
-                left: a.0.min(b.0),
-                top: a.1.min(b.1),
-                right: a.0.max(b.0),
-                bottom: a.1.max(b.1),
-            };
-            taken.push(room.grown(0.5));
+            taken.push(Room::along(at(&pair[0]), at(&pair[1])).grown(0.5));
         }
     }
 }
