@@ -308,6 +308,11 @@ impl Segment {
         Segment { start, end, shape: Shape::constant(value) }
     }
 
+    /// Whether it is a straight line.
+    pub fn is_straight(&self) -> bool {
+        matches!(self.shape, Shape::Line { .. })
+    }
+
     /// The value at `t`.
     pub fn value(&self, t: f64) -> f64 {
         match self.shape {

@@ -1,7 +1,8 @@
 //! A flat program of one instruction a node: what the step loop runs, without allocating.
 //!
 //! Registers hold, in this order, the inputs that are used, the constants, and one result for each instruction;
-//! operands stand before results, so that a run is one pass.
+//! operands stand before results, so that a run is one pass. Instructions of the same operation stand together as far as
+//! their operands allow, so that what to do is asked once for many.
 
 use super::dag::{Dag, NodeId, Op};
 use super::functions::{Function, Value};
@@ -16,33 +17,93 @@ pub struct Program {
     /// The inputs that are used; input `inputs[r]` goes to register r.
     inputs: Vec<u32>,
     constants: Vec<f64>,
-    instructions: Vec<Instruction>,
+    batches: Vec<Batch>,
+    /// The operands of each instruction; its result goes to the register of its own number behind the constants.
+    operands: Vec<[u32; 3]>,
     tables: Vec<Arc<Table>>,
     /// Their registers.
     outputs: Vec<u32>,
 }
 
+/// Instructions of one operation, one after another.
 #[derive(Clone, Copy, Debug)]
-enum Instruction {
-    Add(u32, u32),
-    Subtract(u32, u32),
-    Multiply(u32, u32),
-    Divide(u32, u32),
-    Negate(u32),
-    Power(u32, u32),
-    Not(u32),
+struct Batch {
+    operation: Operation,
+    /// Where they end.
+    end: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Operation {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Negate,
+    Power,
+    Not,
     /// Comparisons and logic.
-    Truth(Binary, u32, u32),
-    Select(u32, u32, u32),
-    Abs(u32),
-    Sign(u32),
-    Sqrt(u32),
-    Min(u32, u32),
-    Max(u32, u32),
-    One(fn(f64) -> f64, u32),
-    Two(fn(f64, f64) -> f64, u32, u32),
-    Table(u32, u32),
-    Slope(u32, u32),
+    Truth(Binary),
+    Select,
+    Abs,
+    Sign,
+    Sqrt,
+    Min,
+    Max,
+    One(fn(f64) -> f64),
+    Two(fn(f64, f64) -> f64),
+    Table(u32),
+    Slope(u32),
+}
+
+/// Instructions are put together within so many: what is computed stays near where it is used.
+const WINDOW: usize = 1024;
+
+/// A node's operation without its operands.
+fn bare(op: Op) -> Op {
+    let none = NodeId(0);
+    match op {
+        Op::Constant(_) | Op::Input(_) => op,
+        Op::Unary(f, _) => Op::Unary(f, none),
+        Op::Binary(f, ..) => Op::Binary(f, none, none),
+        Op::One(f, _) => Op::One(f, none),
+        Op::Two(f, ..) => Op::Two(f, none, none),
+        Op::Select(..) => Op::Select(none, none, none),
+        Op::Table(k, _) => Op::Table(k, none),
+        Op::Slope(k, _) => Op::Slope(k, none),
+    }
+}
+
+fn operation(op: Op) -> Operation {
+    match op {
+        Op::Constant(_) | Op::Input(_) => Operation::One(|_| f64::NAN),
+        Op::Unary(Unary::Negate, _) => Operation::Negate,
+        Op::Unary(Unary::Not, _) => Operation::Not,
+        Op::Binary(op, ..) => match op {
+            Binary::Add => Operation::Add,
+            Binary::Subtract => Operation::Subtract,
+            Binary::Multiply => Operation::Multiply,
+            Binary::Divide => Operation::Divide,
+            Binary::Power => Operation::Power,
+            truth => Operation::Truth(truth),
+        },
+        Op::One(Function::Abs, _) => Operation::Abs,
+        Op::One(Function::Sign, _) => Operation::Sign,
+        Op::One(Function::Sqrt, _) => Operation::Sqrt,
+        Op::One(function, _) => match function.row().value {
+            Value::One(value) => Operation::One(value),
+            _ => Operation::One(|_| f64::NAN),
+        },
+        Op::Two(Function::Min, ..) => Operation::Min,
+        Op::Two(Function::Max, ..) => Operation::Max,
+        Op::Two(function, ..) => match function.row().value {
+            Value::Two(value) => Operation::Two(value),
+            _ => Operation::Two(|_, _| f64::NAN),
+        },
+        Op::Select(..) => Operation::Select,
+        Op::Table(k, _) => Operation::Table(k),
+        Op::Slope(k, _) => Operation::Slope(k),
+    }
 }
 
 impl Program {
@@ -64,39 +125,41 @@ impl Program {
             }
         }
         let first = program.first_result();
-        for node in nodes {
-            let at = |operand: NodeId| register[&operand];
-            let instruction = match dag.op(node) {
-                Op::Constant(_) | Op::Input(_) => continue,
-                Op::Unary(Unary::Negate, a) => Instruction::Negate(at(a)),
-                Op::Unary(Unary::Not, a) => Instruction::Not(at(a)),
-                Op::Binary(op, a, b) => match op {
-                    Binary::Add => Instruction::Add(at(a), at(b)),
-                    Binary::Subtract => Instruction::Subtract(at(a), at(b)),
-                    Binary::Multiply => Instruction::Multiply(at(a), at(b)),
-                    Binary::Divide => Instruction::Divide(at(a), at(b)),
-                    Binary::Power => Instruction::Power(at(a), at(b)),
-                    truth => Instruction::Truth(truth, at(a), at(b)),
-                },
-                Op::One(Function::Abs, a) => Instruction::Abs(at(a)),
-                Op::One(Function::Sign, a) => Instruction::Sign(at(a)),
-                Op::One(Function::Sqrt, a) => Instruction::Sqrt(at(a)),
-                Op::One(function, a) => match function.row().value {
-                    Value::One(value) => Instruction::One(value, at(a)),
-                    _ => Instruction::One(|_| f64::NAN, at(a)),
-                },
-                Op::Two(Function::Min, a, b) => Instruction::Min(at(a), at(b)),
-                Op::Two(Function::Max, a, b) => Instruction::Max(at(a), at(b)),
-                Op::Two(function, a, b) => match function.row().value {
-                    Value::Two(value) => Instruction::Two(value, at(a), at(b)),
-                    _ => Instruction::Two(|_, _| f64::NAN, at(a), at(b)),
-                },
-                Op::Select(c, a, b) => Instruction::Select(at(c), at(a), at(b)),
-                Op::Table(k, a) => Instruction::Table(k, at(a)),
-                Op::Slope(k, a) => Instruction::Slope(k, at(a)),
-            };
-            register.insert(node, (first + program.instructions.len()) as u32);
-            program.instructions.push(instruction);
+        let nodes: Vec<NodeId> =
+            nodes.into_iter().filter(|node| !register.contains_key(node)).collect();
+        for window in nodes.chunks(WINDOW) {
+            // Operands of this window are known once their place in it is done; all others are.
+            let mut done = vec![false; window.len()];
+            let mut waiting: Vec<usize> = (0..window.len()).collect();
+            let inside: Vec<[Option<usize>; 3]> = window
+                .iter()
+                .map(|node| {
+                    let (operands, count) = dag.op(*node).operands();
+                    let place = |k| (k < count).then(|| window.binary_search(&operands[k]).ok());
+                    std::array::from_fn(|k| place(k).flatten())
+                })
+                .collect();
+            // The first that waits has all its operands; with it goes whatever of its kind has its own.
+            while let Some(kind) = waiting.first().map(|k| bare(dag.op(window[*k]))) {
+                waiting.retain(|k| {
+                    let op = dag.op(window[*k]);
+                    let known = inside[*k].iter().flatten().all(|operand| done[*operand]);
+                    if bare(op) != kind || !known {
+                        return true;
+                    }
+                    done[*k] = true;
+                    let (operands, count) = op.operands();
+                    let mut at = [0; 3];
+                    for (at, operand) in at.iter_mut().zip(&operands[..count]) {
+                        *at = register[operand];
+                    }
+                    register.insert(window[*k], (first + program.operands.len()) as u32);
+                    program.operands.push(at);
+                    false
+                });
+                let end = program.operands.len() as u32;
+                program.batches.push(Batch { operation: operation(kind), end });
+            }
         }
         program.outputs = outputs.iter().map(|node| register[node]).collect();
         program
@@ -104,7 +167,7 @@ impl Program {
 
     /// Registers for [`run`](Program::run), with the constants in place.
     pub fn registers(&self) -> Vec<f64> {
-        let mut registers = vec![0.0; self.first_result() + self.instructions.len()];
+        let mut registers = vec![0.0; self.first_result() + self.operands.len()];
         registers[self.inputs.len()..self.first_result()].copy_from_slice(&self.constants);
         registers
     }
@@ -118,36 +181,33 @@ impl Program {
         for (register, input) in registers.iter_mut().zip(&self.inputs) {
             *register = inputs[*input as usize];
         }
-        let first = self.first_result();
-        for (k, instruction) in self.instructions.iter().enumerate() {
-            let (known, rest) = registers.split_at_mut(first + k);
-            let r = |register: u32| known[register as usize];
-            rest[0] = match *instruction {
-                Instruction::Add(a, b) => r(a) + r(b),
-                Instruction::Subtract(a, b) => r(a) - r(b),
-                Instruction::Multiply(a, b) => r(a) * r(b),
-                Instruction::Divide(a, b) => r(a) / r(b),
-                Instruction::Negate(a) => -r(a),
-                Instruction::Power(a, b) => power(r(a), r(b)),
-                Instruction::Not(a) => f64::from(r(a) == 0.0),
-                Instruction::Truth(op, a, b) => op.value(r(a), r(b)),
-                Instruction::Select(c, a, b) => {
-                    if r(c) != 0.0 {
-                        r(a)
-                    } else {
-                        r(b)
-                    }
-                }
-                Instruction::Abs(a) => r(a).abs(),
-                Instruction::Sign(a) => sign(r(a)),
-                Instruction::Sqrt(a) => r(a).sqrt(),
-                Instruction::Min(a, b) => min(r(a), r(b)),
-                Instruction::Max(a, b) => max(r(a), r(b)),
-                Instruction::One(f, a) => f(r(a)),
-                Instruction::Two(f, a, b) => f(r(a), r(b)),
-                Instruction::Table(k, a) => self.tables[k as usize].value(r(a)),
-                Instruction::Slope(k, a) => self.tables[k as usize].slope(r(a)),
-            };
+        let mut results = self.first_result();
+        let mut done = 0;
+        for Batch { operation, end } in &self.batches {
+            let operands = &self.operands[done..*end as usize];
+            let r = (&mut *registers, results, operands);
+            match *operation {
+                Operation::Add => two(r, |a, b| a + b),
+                Operation::Subtract => two(r, |a, b| a - b),
+                Operation::Multiply => two(r, |a, b| a * b),
+                Operation::Divide => two(r, |a, b| a / b),
+                Operation::Negate => one(r, |a| -a),
+                Operation::Power => two(r, power),
+                Operation::Not => one(r, |a| f64::from(a == 0.0)),
+                Operation::Truth(op) => two(r, |a, b| op.value(a, b)),
+                Operation::Select => three(r, |c, a, b| if c != 0.0 { a } else { b }),
+                Operation::Abs => one(r, f64::abs),
+                Operation::Sign => one(r, sign),
+                Operation::Sqrt => one(r, f64::sqrt),
+                Operation::Min => two(r, min),
+                Operation::Max => two(r, max),
+                Operation::One(f) => one(r, f),
+                Operation::Two(f) => two(r, f),
+                Operation::Table(k) => one(r, |a| self.tables[k as usize].value(a)),
+                Operation::Slope(k) => one(r, |a| self.tables[k as usize].slope(a)),
+            }
+            results += operands.len();
+            done = *end as usize;
         }
     }
 
@@ -173,11 +233,35 @@ impl Program {
 
     /// The number of instructions.
     pub fn instructions(&self) -> usize {
-        self.instructions.len()
+        self.operands.len()
     }
 
     fn first_result(&self) -> usize {
         self.inputs.len() + self.constants.len()
+    }
+}
+
+/// Registers, where the first result goes, and the operands of each.
+type Room<'a> = (&'a mut [f64], usize, &'a [[u32; 3]]);
+
+#[inline(always)]
+fn three((registers, first, operands): Room, f: impl Fn(f64, f64, f64) -> f64) {
+    for (at, &[a, b, c]) in (first..).zip(operands) {
+        registers[at] = f(registers[a as usize], registers[b as usize], registers[c as usize]);
+    }
+}
+
+#[inline(always)]
+fn two((registers, first, operands): Room, f: impl Fn(f64, f64) -> f64) {
+    for (at, &[a, b, _]) in (first..).zip(operands) {
+        registers[at] = f(registers[a as usize], registers[b as usize]);
+    }
+}
+
+#[inline(always)]
+fn one((registers, first, operands): Room, f: impl Fn(f64) -> f64) {
+    for (at, &[a, ..]) in (first..).zip(operands) {
+        registers[at] = f(registers[a as usize]);
     }
 }
 

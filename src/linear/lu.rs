@@ -9,6 +9,7 @@
 //! have become bad for the new values ends with [`Trouble`].
 
 use super::choose::{choose_pivots, equilibrate};
+use super::flat::Flat;
 use super::pivots::{Cause, Elimination, Singular};
 use super::{Field, Pattern};
 
@@ -41,7 +42,7 @@ pub struct Lu<T> {
     /// Row and column of the matrix at each place of the order.
     rows: Vec<u32>,
     columns: Vec<u32>,
-    /// Powers of two for the matrix's rows and columns.
+    /// Powers of two for the matrix's rows and columns, in the same order.
     row_scale: Vec<f64>,
     column_scale: Vec<f64>,
     /// The factors, column after column: above the diagonal, diagonal, below.
@@ -59,6 +60,8 @@ pub struct Lu<T> {
     program: Vec<[u32; 3]>,
     /// What each pivot's part of the program is; empty where there is none.
     program_starts: Vec<u32>,
+    /// The factors as solving takes them, when there is a program.
+    flat: Option<Flat<T>>,
     /// One column, when there is no program.
     dense: Vec<T>,
     operations: usize,
@@ -94,7 +97,7 @@ impl<T: Field> Lu<T> {
         }
         let scaled: Vec<T> = values.iter().zip(&scale).map(|(v, by)| v.scaled(*by)).collect();
         let elimination = choose_pivots(pattern, &scaled, small)?;
-        let mut lu = Lu::lay_out(pattern, &elimination, row_scale, column_scale, scale);
+        let mut lu = Lu::lay_out(pattern, &elimination, &row_scale, &column_scale, scale);
         match lu.replay(values, false) {
             Ok(()) => Ok(lu),
             Err(Trouble::Pivot { row, column } | Trouble::NotFinite { row, column }) => {
@@ -112,13 +115,16 @@ impl<T: Field> Lu<T> {
 
     /// Factors new values of the same pattern with the same pivots.
     pub fn refactor(&mut self, values: &[T]) -> Result<(), Trouble> {
-        self.replay(values, true)
+        if self.replay_quickly(values) { Ok(()) } else { self.replay(values, true) }
     }
 
     /// Solves A·x = b in place; `work` has `n` elements and is overwritten.
     pub fn solve(&self, b: &mut [T], work: &mut [T]) {
-        for (w, &row) in work.iter_mut().zip(&self.rows) {
-            *w = b[row as usize].scaled(self.row_scale[row as usize]);
+        if let Some(flat) = &self.flat {
+            return flat.solve(b, work);
+        }
+        for ((w, &row), &by) in work.iter_mut().zip(&self.rows).zip(&self.row_scale) {
+            *w = b[row as usize].scaled(by);
         }
         for k in 0..self.n {
             let x = work[k];
@@ -135,15 +141,15 @@ impl<T: Field> Lu<T> {
                 work[i as usize] = work[i as usize] - u * x;
             }
         }
-        for (&w, &column) in work.iter().zip(&self.columns) {
-            b[column as usize] = w.scaled(self.column_scale[column as usize]);
+        for ((&w, &column), &by) in work.iter().zip(&self.columns).zip(&self.column_scale) {
+            b[column as usize] = w.scaled(by);
         }
     }
 
     /// Solves Aᵀ·x = b in place; `work` has `n` elements and is overwritten.
     pub fn solve_transposed(&self, b: &mut [T], work: &mut [T]) {
-        for (w, &column) in work.iter_mut().zip(&self.columns) {
-            *w = b[column as usize].scaled(self.column_scale[column as usize]);
+        for ((w, &column), &by) in work.iter_mut().zip(&self.columns).zip(&self.column_scale) {
+            *w = b[column as usize].scaled(by);
         }
         for k in 0..self.n {
             let above = self.starts[k] as usize..self.diagonal[k] as usize;
@@ -161,8 +167,8 @@ impl<T: Field> Lu<T> {
             }
             work[k] = sum;
         }
-        for (&w, &row) in work.iter().zip(&self.rows) {
-            b[row as usize] = w.scaled(self.row_scale[row as usize]);
+        for ((&w, &row), &by) in work.iter().zip(&self.rows).zip(&self.row_scale) {
+            b[row as usize] = w.scaled(by);
         }
     }
 
@@ -189,6 +195,7 @@ impl<T: Field> Lu<T> {
     #[cfg(test)]
     pub(super) fn without_program(mut self) -> Lu<T> {
         self.program_starts.clear();
+        self.flat = None;
         self.dense = vec![T::ZERO; self.n];
         self
     }
@@ -227,8 +234,8 @@ impl<T: Field> Lu<T> {
     fn lay_out(
         pattern: &Pattern,
         elimination: &Elimination<T>,
-        row_scale: Vec<f64>,
-        column_scale: Vec<f64>,
+        row_scale: &[f64],
+        column_scale: &[f64],
         scale: Vec<f64>,
     ) -> Lu<T> {
         let n = pattern.n;
@@ -263,7 +270,22 @@ impl<T: Field> Lu<T> {
             (0..n).flat_map(|k| &index[above(k)]).map(|&k| below(k).len()).sum();
         let mut program = Vec::new();
         let mut program_starts = Vec::new();
+        let mut flat = None;
+        let scales = [
+            elimination.rows.iter().map(|row| row_scale[*row as usize]).collect::<Vec<f64>>(),
+            elimination.columns.iter().map(|k| column_scale[*k as usize]).collect(),
+        ];
         if operations <= LISTED {
+            let entries = |k: usize, part: std::ops::Range<usize>| {
+                let index = &index;
+                part.map(move |at| [index[at], k as u32, at as u32])
+            };
+            flat = Flat::new(
+                [&elimination.rows, &elimination.columns],
+                [&scales[0], &scales[1]],
+                (0..n).flat_map(|k| entries(k, below(k as u32))),
+                (0..n).rev().flat_map(|k| entries(k, above(k))),
+            );
             // Column by column in the order in which pivots come, then sorted by pivot: within one pivot's part no
             // two targets are the same, so that nothing waits for the number stored just before.
             let mut parts: Vec<Vec<[u32; 3]>> = vec![Vec::new(); n];
@@ -284,6 +306,7 @@ impl<T: Field> Lu<T> {
                 program_starts.push(program.len() as u32);
             }
         }
+        let [row_scale, column_scale] = scales;
         Lu {
             n,
             rows: elimination.rows.clone(),
@@ -291,6 +314,7 @@ impl<T: Field> Lu<T> {
             row_scale,
             column_scale,
             factors: vec![T::ZERO; entries],
+            flat,
             dense: vec![T::ZERO; if program_starts.is_empty() { n } else { 0 }],
             loaded: vec![0; n],
             index,
@@ -333,6 +357,9 @@ impl<T: Field> Lu<T> {
                 }
             }
         }
+        if let Some(flat) = &mut self.flat {
+            flat.load(&self.factors, &self.inverse, &self.floors);
+        }
         if !T::EXACT && after > 0 {
             let growth = f64::from_bits(after) / f64::from_bits(before);
             if !guarded {
@@ -342,6 +369,43 @@ impl<T: Field> Lu<T> {
             }
         }
         Ok(())
+    }
+
+    /// The same for small matrices, judged at its end as a whole. Says whether all is well; if not, the careful way says
+    /// why.
+    fn replay_quickly(&mut self, values: &[T]) -> bool {
+        let Lu { flat, factors, inverse, .. } = self;
+        let Some(flat) = flat.as_mut().filter(|_| !T::EXACT) else { return false };
+        factors.fill(T::ZERO);
+        let mut before: f64 = 0.0;
+        for ((&at, &by), &value) in self.place.iter().zip(&self.scale).zip(values) {
+            let value = value.scaled(by);
+            before = before.max(value.magnitude());
+            factors[at as usize] = value;
+        }
+        for (loaded, &at) in self.loaded.iter_mut().zip(&self.diagonal) {
+            *loaded = bits(factors[at as usize]);
+        }
+        let parts = self.program_starts.windows(2).zip(&self.starts[1..]);
+        let pivots = self.diagonal.iter().zip(inverse.iter_mut());
+        for ((&at, inverse), (part, &end)) in pivots.zip(parts) {
+            *inverse = T::ONE / factors[at as usize];
+            for below in &mut factors[at as usize + 1..end as usize] {
+                *below = *below * *inverse;
+            }
+            for &[a, b, c] in &self.program[part[0] as usize..part[1] as usize] {
+                factors[a as usize] =
+                    factors[a as usize] - factors[b as usize] * factors[c as usize];
+            }
+        }
+        let mut seen = flat.load(factors, inverse, &self.floors);
+        let pivots = inverse.iter().zip(&self.loaded).zip(&self.floors);
+        for ((inverse, &loaded), (_, floor)) in pivots {
+            let (inverse, loaded) = (inverse.magnitude(), f64::from_bits(loaded));
+            seen.take(loaded * inverse * floor, loaded.max(inverse.recip()));
+        }
+        // Where nothing passes its pivot's bound, neither does what stood there before the division.
+        seen.worst <= 1.0 && seen.largest <= GUARD_GROWTH * self.growth * before
     }
 
     /// Subtracts from a column all that the pivots before it take out of it.

@@ -10,6 +10,7 @@ mod choose;
 mod components;
 mod degree;
 mod field;
+mod flat;
 mod gilbert;
 mod lu;
 mod markowitz;

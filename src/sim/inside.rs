@@ -74,6 +74,11 @@ impl Inside {
         if index2 && (!work.dense.by_unknowns || network.system.is_linear()) {
             return self.shorter_step(network, from, to, time, weights, work);
         }
+        if !index2 && network.is_straight() {
+            work.dense.unknowns(theta, from, to, &mut self.point.x);
+            self.point.t = time;
+            return Ok(());
+        }
         let rough = *self.rough.get_or_insert_with(|| is_rough(network, from, to, weights, work));
         work.dense.unknowns(theta, from, to, &mut self.point.x);
         if work.dense.by_unknowns {

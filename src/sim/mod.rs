@@ -30,6 +30,7 @@ mod search;
 mod sensitivity;
 mod sensitivity_in_time;
 mod settings;
+mod sparse;
 mod statistics;
 mod step;
 mod structure;

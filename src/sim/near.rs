@@ -5,6 +5,7 @@
 //! derivatives. Now and then ρ is measured again. Where it is large, the stage is solved by Newton's method with new
 //! factors.
 
+use super::methods::weighted;
 use super::network::Network;
 use super::newton::{GROWN, MEASURED_AGAIN, Scratch, Stage, stage_residual};
 
@@ -94,12 +95,7 @@ fn iterate(
     let residual = &mut scratch.residual[..n];
     stage_residual(network, stage, x, q, residual, &mut scratch.rates);
     network.solve_dynamic(residual);
-    let mut update: f64 = 0.0;
-    for (dx, weight) in residual.iter().zip(stage.weights) {
-        let size = dx.abs() / weight;
-        // `max` would lose what is no number.
-        update = if size <= update { update } else { size };
-    }
+    let update = weighted(residual, stage.weights);
     if !update.is_finite() {
         scratch.near.failed();
         return None;

@@ -172,6 +172,15 @@ impl<'a> Network<'a> {
         self.statistics.corners += u64::from(corner);
     }
 
+    /// Whether polynomials through values that meet the equations meet them between too: they are linear, and what drives
+    /// them follows straight lines.
+    pub fn is_straight(&self) -> bool {
+        self.system.is_linear()
+            && !self.system.output_rates
+            && self.memories.is_empty()
+            && self.segments.iter().all(Segment::is_straight)
+    }
+
     /// Inputs of the memories at a point.
     pub fn read_memories(&mut self, x: &[f64], t: f64) {
         if !self.memories.is_empty() {

@@ -132,6 +132,14 @@ pub(crate) fn solve_stage(
         network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
         scratch.near.forget();
         network.solve_dynamic(residual);
+        if linear {
+            x.iter_mut().zip(residual.iter()).for_each(|(x, dx)| *x -= dx);
+            if !x.iter().sum::<f64>().is_finite() && x.iter().any(|x| !x.is_finite()) {
+                return Err(Cut::NonFinite { device: None });
+            }
+            network.charges(x, q);
+            return Ok(());
+        }
         let last = &mut scratch.before[..n];
         let damped = damping && swings(residual, last, stage.weights);
         let part = if damped { SWING } else { 1.0 };
@@ -144,10 +152,6 @@ pub(crate) fn solve_stage(
             update = update.max(dx.abs() / weight);
         }
         last.copy_from_slice(residual);
-        if linear {
-            network.charges(x, q);
-            return Ok(());
-        }
         let rate = if iteration == 0 { 0.0 } else { update / before };
         if iteration == 0 {
             scratch.age += 1;

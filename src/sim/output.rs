@@ -217,8 +217,10 @@ impl<'a> Rows<'a> {
         self.widen();
         // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
         // only what is written is solved for. Within the long steps of methods of higher order what follows a source
-        // moves in ways that their polynomials do not say.
-        let smooth = !index2 && work.dense.by_past && !network.system.output_rates;
+        // moves in ways that their polynomials do not say, unless that is straight and all is linear.
+        let by_past = work.dense.by_past && !network.system.output_rates;
+        let smooth = !index2 && (by_past || network.is_straight());
+        let parabolic = by_past && network.system.law_columns.is_empty();
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;
@@ -231,8 +233,10 @@ impl<'a> Rows<'a> {
             let span = right[0] - left[0];
             let mut off = 0.0;
             if halved < MOST_HALVED && span > self.slack {
-                // A curve that swings about its line may cross it in the middle, and a bend may lie near an end.
-                for theta in [0.5, 0.25, 0.75] {
+                // A curve that swings about its line may cross it in the middle, and a bend may lie near an end; but a
+                // parabola is farthest from a line in the middle.
+                let asked: &[f64] = if parabolic { &[0.5] } else { &[0.5, 0.25, 0.75] };
+                for &theta in asked {
                     let time = left[0] + theta * span;
                     if smooth {
                         self.interpolate(network, from, to, time, work);

@@ -1,6 +1,7 @@
 //! Where every value goes in the two matrices of a system: their patterns, and a place for each partial derivative.
 
-use super::system::{LawGroup, MatrixPlan, Place, Rows, Target};
+use super::sparse::Rows;
+use super::system::{LawGroup, MatrixPlan, Place, Target};
 use crate::linear::Pattern;
 
 /// A system's static parts.
@@ -97,7 +98,7 @@ impl Plan {
 /// W(α) = G + f' + α·A·(C + q').
 fn plan_dynamic(parts: &Parts, groups: &[LawGroup]) -> (MatrixPlan, Vec<Dynamic>) {
     let Parts { n, time, conductances, charges, rates, .. } = *parts;
-    let (static_count, moving) = (conductances.values.len(), rates.values.len());
+    let (static_count, moving) = (conductances.entries(), rates.entries());
     let mut plan = Plan::with_capacity(static_count + 2 * moving);
     let mut fixed: Vec<(u32, f64)> = Vec::with_capacity(static_count);
     for (row, column, value) in conductances.triplets() {
@@ -155,10 +156,9 @@ fn plan_dynamic(parts: &Parts, groups: &[LawGroup]) -> (MatrixPlan, Vec<Dynamic>
 /// The frozen network, with the slots of the nodes' diagonal entries and of each charge's own w.
 fn plan_frozen(parts: &Parts, groups: &[LawGroup]) -> Frozen {
     let Parts { n, nodes, conductances, charges, rates, .. } = *parts;
-    let (static_count, moving) = (conductances.values.len(), rates.values.len());
-    let count = charges.starts.len() - 1;
-    let mut plan =
-        Plan::with_capacity(static_count + moving + charges.values.len() + nodes + count);
+    let (static_count, moving) = (conductances.entries(), rates.entries());
+    let count = charges.len();
+    let mut plan = Plan::with_capacity(static_count + moving + charges.entries() + nodes + count);
     let mut fixed: Vec<(u32, f64)> = Vec::with_capacity(static_count + moving);
     for (row, column, value) in conductances.triplets() {
         fixed.push((plan.ask(row, column), value));
@@ -166,7 +166,7 @@ fn plan_frozen(parts: &Parts, groups: &[LawGroup]) -> Frozen {
     for (k, equation, sign) in rates.triplets() {
         fixed.push((plan.ask(equation, n + k), sign));
     }
-    let mut storage: Vec<Place> = Vec::with_capacity(charges.values.len());
+    let mut storage: Vec<Place> = Vec::with_capacity(charges.entries());
     for (k, column, value) in charges.triplets() {
         let slot = plan.ask(n + k, column);
         storage.push(Place { partial: k as u32, slot, factor: value });

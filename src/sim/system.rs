@@ -13,104 +13,13 @@
 use super::clocks::Clock;
 use super::laws::LawSet;
 use super::memory::MemoryData;
+use super::sparse::Rows;
 use crate::circuit::stamps::{DeviceLabel, Junction, Unknown};
 use crate::circuit::{DeviceId, Parts, Waveform};
 use crate::linear::Pattern;
 use crate::source::Span;
 use std::fmt;
 use std::sync::Arc;
-
-/// A sparse list of rows: row `r` holds the entries `starts[r]..starts[r + 1]`.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Rows {
-    pub starts: Vec<u32>,
-    pub columns: Vec<u32>,
-    pub values: Vec<f64>,
-}
-
-impl Rows {
-    /// Sorts triplets by row and column; equal places add up in the order given.
-    pub fn new(rows: usize, triplets: &[(u32, u32, f64)]) -> Rows {
-        // Dealt out by row; then each row, which is short, is sorted by itself.
-        let mut ends = vec![0u32; rows + 1];
-        for (row, ..) in triplets {
-            ends[*row as usize + 1] += 1;
-        }
-        for row in 0..rows {
-            ends[row + 1] += ends[row];
-        }
-        let mut dealt = vec![(0u32, 0.0); triplets.len()];
-        for (row, column, value) in triplets {
-            let at = &mut ends[*row as usize];
-            dealt[*at as usize] = (*column, *value);
-            *at += 1;
-        }
-        // Now `ends[row]` is where the row ends.
-        let mut result = Rows {
-            starts: Vec::with_capacity(rows + 1),
-            columns: Vec::with_capacity(triplets.len()),
-            values: Vec::with_capacity(triplets.len()),
-        };
-        result.starts.push(0);
-        let mut from = 0;
-        for end in &ends[..rows] {
-            let row = &mut dealt[from..*end as usize];
-            from = *end as usize;
-            row.sort_by_key(|(column, _)| *column);
-            let first = result.columns.len();
-            for (column, value) in row {
-                match result.values.last_mut() {
-                    Some(sum) if result.columns[first..].last() == Some(column) => *sum += *value,
-                    _ => {
-                        result.columns.push(*column);
-                        result.values.push(*value);
-                    }
-                }
-            }
-            result.starts.push(result.columns.len() as u32);
-        }
-        result
-    }
-
-    /// Entries of a row.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let range = self.starts[row] as usize..self.starts[row + 1] as usize;
-        self.columns[range.clone()].iter().zip(&self.values[range]).map(|(c, v)| (*c as usize, *v))
-    }
-
-    /// All entries as (row, column, value).
-    pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        (0..self.starts.len().saturating_sub(1))
-            .flat_map(move |row| self.row(row).map(move |(column, value)| (row, column, value)))
-    }
-
-    /// y += factor·(rows · x)
-    pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
-        let mut from = self.starts[0] as usize;
-        for (sum, end) in y.iter_mut().zip(&self.starts[1..]) {
-            let to = *end as usize;
-            let mut row = 0.0;
-            for (column, value) in self.columns[from..to].iter().zip(&self.values[from..to]) {
-                row += value * x[*column as usize];
-            }
-            *sum += factor * row;
-            from = to;
-        }
-    }
-
-    /// y += factor·(transpose · w): rows are scattered into the places their columns name.
-    pub fn add_transposed(&self, factor: f64, w: &[f64], y: &mut [f64]) {
-        let mut from = self.starts[0] as usize;
-        for (weight, end) in w.iter().zip(&self.starts[1..]) {
-            let to = *end as usize;
-            let scaled = factor * weight;
-            for (column, value) in self.columns[from..to].iter().zip(&self.values[from..to]) {
-                y[*column as usize] += scaled * value;
-            }
-            from = to;
-        }
-    }
-}
 
 /// Where one value of the laws goes.
 #[derive(Clone, Debug)]
@@ -276,7 +185,7 @@ impl System {
     /// Makes 0 of every unknown that no charge depends on.
     pub fn keep_stored(&self, x: &mut [f64]) {
         let mut stored = vec![false; x.len()];
-        self.charges.columns.iter().for_each(|k| stored[*k as usize] = true);
+        self.charges.columns().iter().for_each(|k| stored[*k as usize] = true);
         for group in &self.groups {
             group.charge_slopes.iter().for_each(|(_, _, k)| stored[*k as usize] = true);
         }

@@ -88,16 +88,21 @@ fn plain(error: ::csv::Error) -> io::Error {
     }
 }
 
-/// Appends the shortest decimal number that reads back as the same value; zero has no sign.
+/// Appends the shortest decimal number that reads back as the same value; zero has no sign, whole numbers no point.
 pub fn number(value: f64, text: &mut String) {
     use std::fmt::Write;
-    let value = if value == 0.0 { 0.0 } else { value };
     let size = value.abs();
     // Writing to a String cannot fail.
-    let _ = if value == 0.0 || !size.is_finite() || (1e-5..1e16).contains(&size) {
+    let _ = if value == 0.0 {
+        write!(text, "0")
+    } else if !size.is_finite() {
         write!(text, "{value}")
-    } else {
+    } else if size >= 1e16 {
         write!(text, "{value:e}")
+    } else {
+        let mut digits = zmij::Buffer::new();
+        let digits = digits.format_finite(value);
+        write!(text, "{}", digits.strip_suffix(".0").unwrap_or(digits))
     };
 }
 
@@ -178,6 +183,39 @@ mod tests {
         let heading = Heading { units: true, ..Heading::default() };
         write(&trace, &heading, &mut bytes).unwrap();
         insta::assert_snapshot!(String::from_utf8(bytes).unwrap());
+    }
+
+    #[test]
+    fn numbers_are_the_shortest() {
+        use crate::quantity::random::fraction;
+        let mut values =
+            vec![0.0, -0.0, 1.0, -1.0, 1e-5, 9.999999999999999e-6, 1e16, 9.999999999999998e15];
+        values.extend([
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            5e-324,
+            f64::INFINITY,
+            f64::NAN,
+            123456.0,
+            1e15,
+        ]);
+        values.extend(
+            (0..20_000u64).map(|k| f64::from_bits((fraction(7, k) * 2f64.powi(64)) as u64)),
+        );
+        values.extend((0..20_000u64).map(|k| fraction(9, k) - 0.5));
+        for value in values {
+            let mut text = String::new();
+            number(value, &mut text);
+            if value.is_nan() {
+                assert_eq!(text, "NaN");
+                continue;
+            }
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), (value + 0.0).to_bits());
+            // As long as the standard library's shortest; of two equally near ones it may take the other.
+            let plain = value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs());
+            let other = if plain { format!("{}", value + 0.0) } else { format!("{value:e}") };
+            assert_eq!((text.len(), text.contains('e')), (other.len(), other.contains('e')));
+        }
     }
 
     #[test]

@@ -30,13 +30,13 @@ pub(crate) fn step(
     let missed = history.predict(from, to.t, x);
     to.x.copy_from_slice(x);
     network.remember_junctions(&from.x);
-    for (k, beta) in beta.iter_mut().enumerate() {
-        *beta = -alpha * from.q[k] - from.w[k];
+    for (beta, (q, w)) in beta.iter_mut().zip(from.q.iter().zip(&from.w)) {
+        *beta = -alpha * q - w;
     }
     let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION, unconfirmed };
     solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
-    for (k, rate) in to.w.iter_mut().enumerate() {
-        *rate = alpha * to.q[k] + beta[k];
+    for (rate, (q, beta)) in to.w.iter_mut().zip(to.q.iter().zip(beta.iter())) {
+        *rate = alpha * q + beta;
     }
     dense.hermite(history, from, to);
     let away = missed.map_or(f64::INFINITY, |missed| {
@@ -47,9 +47,9 @@ pub(crate) fn step(
         return Ok(away);
     }
     let last = from.t - before;
-    for (k, sum) in sum.iter_mut().enumerate() {
-        let second = second_difference(h, last, history.w[k], from.w[k], to.w[k]);
-        *sum = h * h * h / 6.0 * second;
+    let rates = history.w.iter().zip(&from.w).zip(&to.w);
+    for (sum, ((before, from), to)) in sum.iter_mut().zip(rates) {
+        *sum = h * h * h / 6.0 * second_difference(h, last, *before, *from, *to);
     }
     filtered_error(network, alpha, sum, error);
     Ok(weighted(error, weights).min(away))

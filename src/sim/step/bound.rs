@@ -12,10 +12,10 @@ const BOUND: u32 = 10;
 /// A step of the trapezoidal rule that errs by more than this part of its tolerance is as long as the error lets it be;
 const LARGE: f64 = 0.3;
 /// where that is less than this part of the limit, so many times more often than not, the other method comes back.
-const SHORT: f64 = 0.5;
+const SHORT: f64 = 0.2;
 const STRUGGLES: u32 = 20;
 /// Each time it comes back the limit must bind this many times as long.
-const PATIENCE: u32 = 4;
+const PATIENCE: u32 = 2;
 
 /// What the last steps say of the limit.
 #[derive(Default)]

@@ -299,14 +299,17 @@ impl Run<'_> {
     pub(super) fn weigh(&mut self) {
         let reltol = self.settings.reltol;
         let part = if self.index2 { index_2_part(reltol) } else { 1.0 };
-        for (k, x) in self.state.x.iter().enumerate() {
-            self.largest[k] = self.largest[k].max(x.abs());
-            self.weights[k] = if self.untested[k] {
-                f64::INFINITY
-            } else {
-                let weight = part * (reltol * self.largest[k] + self.absolute[k]);
-                weight.max(self.rounding.floor(k)).max(f64::MIN_POSITIVE)
-            };
+        let Run { state, largest, weights, absolute, rounding, untested, .. } = self;
+        for (largest, x) in largest.iter_mut().zip(&state.x) {
+            *largest = if x.abs() > *largest { x.abs() } else { *largest };
+        }
+        let bases = largest.iter().zip(absolute.iter()).zip(rounding.floors());
+        for (weight, ((largest, absolute), floor)) in weights.iter_mut().zip(bases) {
+            *weight = (part * (reltol * largest + absolute)).max(*floor).max(f64::MIN_POSITIVE);
+        }
+        if self.index2 || self.was_index2 {
+            let tested = weights.iter_mut().zip(untested);
+            tested.filter(|(_, untested)| **untested).for_each(|(w, _)| *w = f64::INFINITY);
         }
         if !self.index2 && !self.was_index2 {
             return;

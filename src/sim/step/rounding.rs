@@ -36,9 +36,9 @@ impl Rounding {
         self.age = 0;
     }
 
-    /// The least weight of an unknown.
-    pub fn floor(&self, k: usize) -> f64 {
-        self.floors[k]
+    /// The least weight of each unknown.
+    pub fn floors(&self) -> &[f64] {
+        &self.floors
     }
 }
 
