@@ -57,7 +57,7 @@ enum Operation {
 }
 
 /// Instructions are put together within so many: what is computed stays near where it is used.
-const WINDOW: usize = 1024;
+const WINDOW: usize = 128;
 
 /// A node's operation without its operands.
 fn bare(op: Op) -> Op {
