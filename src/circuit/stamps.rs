@@ -122,6 +122,8 @@ pub struct Junction {
     pub thermal: f64,
     /// The voltage above which limiting begins, n·Vt·ln(n·Vt/(√2·Is)).
     pub critical: f64,
+    /// The voltages between which next to nothing flows: short of breakdown, and of conduction.
+    pub off: [f64; 2],
 }
 
 /// A term of b: an independent source enters the *right-hand side* of each equation of `into` with its factor.

@@ -350,6 +350,38 @@ impl Dag {
         Some((constant, factors.into_iter().filter(|(_, factor)| *factor != 0.0).collect()))
     }
 
+    /// Whether the node is constant + Σ factor·input over the inputs below `moving`, wherever the inputs beyond `still`
+    /// stay as they are; nothing else may stand in it.
+    pub fn is_affine_while(&self, node: NodeId, moving: u32, still: u32) -> bool {
+        /// Degree in what moves: 0, 1 or more.
+        const CURVED: u32 = 2;
+        let mut degrees: FxHashMap<NodeId, u32> = FxHashMap::default();
+        for below in self.below(&[node]) {
+            let of = |operand: NodeId| degrees.get(&operand).copied().unwrap_or(CURVED);
+            let degree = match self.op(below) {
+                Op::Constant(_) => 0,
+                Op::Input(k) if k < moving => 1,
+                Op::Input(k) if k >= still => 0,
+                Op::Input(_) => CURVED,
+                Op::Unary(Unary::Negate, a) => of(a),
+                Op::Binary(Binary::Add | Binary::Subtract, a, b) => of(a).max(of(b)),
+                Op::Binary(Binary::Multiply, a, b) => of(a) + of(b),
+                Op::Binary(Binary::Divide, a, b) if of(b) == 0 => of(a),
+                Op::Select(c, a, b) if of(c) == 0 => of(a).max(of(b)),
+                op => {
+                    let (operands, n) = op.operands();
+                    operands[..n]
+                        .iter()
+                        .map(|operand| CURVED * of(*operand).min(1))
+                        .max()
+                        .unwrap_or(CURVED)
+                }
+            };
+            degrees.insert(below, degree);
+        }
+        degrees.get(&node).is_some_and(|degree| *degree < CURVED)
+    }
+
     /// The node of an operation, which may be there already.
     pub(super) fn intern(&mut self, op: Op) -> NodeId {
         if let Some(node) = self.index.get(&op) {
@@ -396,4 +428,37 @@ fn scaled(
     scale: impl Fn(f64) -> f64,
 ) -> (f64, BTreeMap<u32, f64>) {
     (scale(form.0), form.1.iter().map(|(k, factor)| (*k, scale(*factor))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_of_a_mode_are_affine_while_it_stays() {
+        let mut dag = Dag::default();
+        // Unknowns 0 and 1, time 2, a mode 3.
+        let [x, y, time, mode] = [0, 1, 2, 3].map(|k| dag.input(k));
+        let across = dag.binary(Binary::Subtract, x, y);
+        let two = dag.constant(2.0);
+        let conductance = dag.select(mode, two, time);
+        let closed = dag.select(mode, two, mode);
+        let [linear, timed] =
+            [closed, conductance].map(|g| dag.binary(Binary::Multiply, across, g));
+        let square = dag.binary(Binary::Multiply, across, across);
+        let chosen = dag.select(across, two, mode);
+        let root = dag.call(Function::Sqrt, &[mode]);
+        let inverse = dag.binary(Binary::Divide, linear, root);
+        let step = dag.call(Function::Floor, &[across]);
+        for (node, expected) in [
+            (linear, true),
+            (inverse, true),
+            (timed, false),
+            (square, false),
+            (chosen, false),
+            (step, false),
+        ] {
+            assert_eq!(dag.is_affine_while(node, 2, 3), expected, "{:?}", dag.op(node));
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
-use super::laws::LawSet;
+use super::laws::{self, Group, LawSet, Placed};
 use super::memory::MemoryData;
 use super::plans::{self, Plans};
 use super::reduce;
@@ -10,7 +10,7 @@ use super::sparse::Rows;
 use super::structure;
 use super::system::{Guard, LawGroup, ModeData, Source, System, Target};
 use crate::circuit::DeviceId;
-use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
+use crate::circuit::stamps::{Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
 use crate::expr::{Dag, Node, NodeId};
 use crate::source::Span;
@@ -60,13 +60,6 @@ fn compile_for(stamps: &Stamps, linear: bool, d: &mut Vec<Diagnostic>) -> Option
     }
 }
 
-/// A law on its way into a group.
-struct Placed {
-    node: NodeId,
-    target: Target,
-    device: DeviceId,
-}
-
 struct Builder<'a> {
     stamps: &'a Stamps,
     /// Output columns and what is delayed have derivatives.
@@ -81,7 +74,7 @@ struct Builder<'a> {
     curved: Vec<bool>,
     /// Charges that others determine.
     dependent: Vec<bool>,
-    groups: Vec<(Dag, Vec<Placed>, Option<Junction>)>,
+    groups: Vec<Group>,
     conditions: Conditions,
 }
 
@@ -173,8 +166,8 @@ impl<'a> Builder<'a> {
     fn place_laws(&mut self) {
         let stamps = self.stamps;
         let n = self.unknowns.len() as u32;
-        let mut plain: (Dag, Vec<Placed>, Option<Junction>) = (Dag::default(), vec![], None);
-        let mut junctions: BTreeMap<u32, (Dag, Vec<Placed>, Option<Junction>)> = BTreeMap::new();
+        let mut plain: Group = (Dag::default(), vec![], None);
+        let mut junctions: BTreeMap<u32, Group> = BTreeMap::new();
         for stamp in &stamps.laws {
             if let Some(junction) = stamp.junction {
                 junctions
@@ -224,6 +217,8 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+        let (modal, plain) = laws::part_modal(plain, self.time_input());
+        self.groups.push(modal);
         self.groups.push(plain);
         self.groups.extend(junctions.into_values());
         self.groups.retain(|(_, laws, _)| !laws.is_empty());
@@ -315,7 +310,9 @@ impl<'a> Builder<'a> {
         let mut groups: Vec<LawGroup> = vec![];
         for (mut dag, laws, junction) in std::mem::take(&mut self.groups) {
             let nodes: Vec<NodeId> = laws.iter().map(|law| law.node).collect();
+            let modal = junction.is_none() && laws.iter().all(|law| law.is_modal(&dag, time));
             groups.push(LawGroup {
+                modal,
                 laws: LawSet::new(&mut dag, &nodes, time as u32 + 1),
                 devices: laws.iter().map(|law| law.device).collect(),
                 targets: laws.into_iter().map(|law| law.target).collect(),

@@ -109,6 +109,7 @@ impl Kept {
     fn give(&self, network: &mut Network) {
         if self.modes.len() == network.modes.len() {
             network.modes.copy_from_slice(&self.modes);
+            network.forget_modes();
         }
     }
 }

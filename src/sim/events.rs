@@ -144,6 +144,7 @@ impl Network<'_> {
     pub(crate) fn set_mode(&mut self, mode: usize, value: f64) {
         let slot = self.slot(mode);
         self.modes[slot] = value;
+        self.forget_modes();
     }
 
     /// Whether it is a condition that follows from the solution.
@@ -160,6 +161,7 @@ impl Network<'_> {
     pub(crate) fn set_hold(&mut self, mode: usize, hold: f64) {
         let slot = self.slot(mode);
         self.modes[slot + 1] = hold;
+        self.forget_modes();
     }
 
     /// Whether steps must end where its guard crosses, or leaves its ramp.
@@ -356,7 +358,7 @@ impl Network<'_> {
         }
         let edge = match self.system.modes[mode].guard {
             Guard::Switch { .. } => {
-                self.forget_pivots();
+                self.change_pivots();
                 return false;
             }
             Guard::Side => 0.0,
@@ -394,7 +396,7 @@ impl Network<'_> {
         self.modes[slot + 2] = 1.0 / width;
         self.tracks[mode].edge = edge;
         self.tracks[mode].bounces = 0;
-        self.forget_constant_factors();
+        self.forget_modes();
     }
 
     /// Whether a slide of this mode is new to whoever started the run.
@@ -447,7 +449,7 @@ pub(crate) fn settle_modes(
             network.set_mode(worst, value);
             network.changed();
             if matches!(network.system.modes[worst].guard, Guard::Switch { .. }) {
-                network.forget_pivots();
+                network.change_pivots();
             }
         }
         let worst = most_contradicted(network, &controls).map_or(0, |(mode, _)| mode);

@@ -25,6 +25,8 @@ pub(crate) struct Inside {
     pub point: State,
     /// Charges that are states.
     held: Vec<bool>,
+    /// The unknowns that are asked for.
+    asked: Vec<bool>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     pub factorised: Option<bool>,
     /// Whether what is interpolated in this step is too far from the equations; `None`: not yet asked.
@@ -42,6 +44,7 @@ impl Inside {
         Inside {
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
+            asked: vec![true; system.equations()],
             factorised: None,
             rough: None,
             reached: State::new(f64::NAN, system.equations(), system.charges()),
@@ -50,11 +53,36 @@ impl Inside {
         }
     }
 
+    /// For output columns alone.
+    pub fn of_outputs(network: &Network) -> Inside {
+        let system = network.system;
+        let mut inside = Inside::new(network);
+        if system.law_columns.is_empty() {
+            inside.asked.fill(false);
+            let columns = system.plain_outputs.iter();
+            columns.for_each(|(_, unknown)| inside.asked[*unknown as usize] = true);
+        }
+        inside
+    }
+
     /// Another step begins.
     pub fn begin(&mut self) {
         self.factorised = None;
         self.rough = None;
         self.reached.t = f64::NAN;
+    }
+
+    /// Whether what is interpolated in this step is too far from the equations.
+    pub fn is_rough(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> bool {
+        let asked = &self.asked;
+        *self.rough.get_or_insert_with(|| is_rough(network, from, to, asked, weights, work))
     }
 
     /// Puts the values at a time inside a step into `self.point`.
@@ -71,7 +99,7 @@ impl Inside {
     ) -> Result<(), Stopped> {
         let theta = (time - from.t) / (to.t - from.t);
         // Rows of linear circuits meet their equations to rounding, whatever the tolerance.
-        if index2 && (!work.dense.by_unknowns || network.system.is_linear()) {
+        if index2 && (!work.dense.by_unknowns || network.system.groups.is_empty()) {
             return self.shorter_step(network, from, to, time, weights, work);
         }
         if !index2 && network.is_straight() {
@@ -79,7 +107,7 @@ impl Inside {
             self.point.t = time;
             return Ok(());
         }
-        let rough = *self.rough.get_or_insert_with(|| is_rough(network, from, to, weights, work));
+        let rough = self.is_rough(network, from, to, weights, work);
         work.dense.unknowns(theta, from, to, &mut self.point.x);
         if work.dense.by_unknowns {
             network.evaluate(&self.point.x, time);
@@ -255,12 +283,13 @@ impl Inside {
     }
 }
 
-/// Whether parabolas of the unknowns miss the equations between the ends of a step by more than the step may err: a diode
-/// that begins or ends to conduct bends the solution there, and only the values at the stages are tested.
+/// Whether parabolas of the unknowns asked for miss the equations between the ends of a step by more than the step may
+/// err: a diode that begins or ends to conduct bends the solution there, and only the values at the stages are tested.
 fn is_rough(
     network: &mut Network,
     from: &State,
     to: &State,
+    asked: &[bool],
     weights: &[f64],
     work: &mut Work,
 ) -> bool {
@@ -269,6 +298,13 @@ fn is_rough(
     /// In units of what a step may err by.
     const MOST: f64 = 2.0;
     if !work.dense.by_unknowns {
+        return false;
+    }
+    let within = |theta: f64| {
+        let dense = &work.dense;
+        move |k: usize| dense.unknown(k, theta, from, to)
+    };
+    if network.rests_at([0.0, 0.5, 1.0].map(within)) {
         return false;
     }
     let h = to.t - from.t;
@@ -284,6 +320,9 @@ fn is_rough(
         network.add_charge_change(1.0 / h, &work.error, &mut work.sum);
         network.system.rates.add_transposed(1.0, &work.sum, &mut work.right);
         network.solve_dynamic(&mut work.right);
+        for (missed, asked) in work.right.iter_mut().zip(asked) {
+            *missed = if *asked || missed.is_nan() { *missed } else { 0.0 };
+        }
         methods::weighted(&work.right, weights) > MOST
     })
 }

@@ -1,6 +1,35 @@
 //! A set of laws as two programs: values alone, and values with all partial derivatives.
 
+use super::system::Target;
+use crate::circuit::DeviceId;
+use crate::circuit::stamps::Junction;
 use crate::expr::{Dag, NodeId, Program};
+
+/// A law on its way into a group.
+pub(crate) struct Placed {
+    pub node: NodeId,
+    pub target: Target,
+    pub device: DeviceId,
+}
+
+impl Placed {
+    /// Whether it is affine in the unknowns, which stand before time, for fixed modes, which stand behind it.
+    pub fn is_modal(&self, dag: &Dag, time: usize) -> bool {
+        matches!(self.target, Target::Equations(_))
+            && dag.is_affine_while(self.node, time as u32, time as u32 + 1)
+    }
+}
+
+/// A group on its way into a system.
+pub(crate) type Group = (Dag, Vec<Placed>, Option<Junction>);
+
+/// Takes out of a group the laws that are affine for fixed modes.
+pub(crate) fn part_modal((dag, laws, junction): Group, time: usize) -> (Group, Group) {
+    let (modal, curved): (Vec<_>, Vec<_>) =
+        laws.into_iter().partition(|law| law.is_modal(&dag, time));
+    let own = if modal.is_empty() { Dag::default() } else { dag.clone() };
+    ((own, modal, None), (dag, curved, junction))
+}
 
 /// Laws over common inputs.
 #[derive(Clone, Debug, Default)]

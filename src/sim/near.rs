@@ -16,6 +16,11 @@ const SLOW: f64 = 0.25;
 /// and so many stages do without a try then, twice as many each time.
 const LONGEST_PAUSE: u32 = 64;
 
+/// Where so many stages of junctions, one after another, have taken two iterations, one with new factors is the cheaper:
+const TWICE: u32 = 4;
+/// so many stages take that.
+const CHEAPER: u32 = 16;
+
 /// What is known of iterations with the factors at hand.
 #[derive(Debug)]
 pub(crate) struct Near {
@@ -26,10 +31,12 @@ pub(crate) struct Near {
     /// Stages that are still to do without, and how many the next time.
     wait: u32,
     pause: u32,
+    /// Stages that took two iterations, one after another.
+    twice: u32,
 }
 
 impl Near {
-    pub const UNKNOWN: Near = Near { rate: f64::INFINITY, age: 0, wait: 0, pause: 1 };
+    pub const UNKNOWN: Near = Near { rate: f64::INFINITY, age: 0, wait: 0, pause: 1, twice: 0 };
 
     /// New factors: ρ is not known.
     pub fn forget(&mut self) {
@@ -51,7 +58,7 @@ pub(crate) fn solve(
     q: &mut [f64],
     scratch: &mut Scratch,
 ) -> bool {
-    if network.system.has_junctions() || !network.factors_serve(stage.alpha) {
+    if !network.factors_serve(stage.alpha) || !network.junctions_rest(x) {
         return false;
     }
     if scratch.near.wait > 0 {
@@ -59,11 +66,13 @@ pub(crate) fn solve(
         return false;
     }
     let n = x.len();
+    scratch.guess.copy_from_slice(x);
     let Some(first) = iterate(network, stage, x, q, scratch) else { return false };
     let Scratch { near, residual, .. } = scratch;
     let known = GROWN * near.rate * first <= stage.unconfirmed && near.age < MEASURED_AGAIN;
-    if first == 0.0 || (known && first <= NEAR) {
+    if first == 0.0 || (known && (first <= NEAR || network.meets_no_kink(x))) {
         near.age += 1;
+        near.twice = 0;
         network.add_charge_change(-1.0, &residual[..n], q);
         return true;
     }
@@ -72,9 +81,17 @@ pub(crate) fn solve(
     let rate = second / first;
     if rate > SLOW || rate / (1.0 - rate) * second > stage.unconfirmed {
         near.failed();
+        if network.system.has_junctions() && rate > 1.0 {
+            // An exponential makes much of a step too far.
+            x.copy_from_slice(&scratch.guess[..n]);
+        }
         return false;
     }
     (near.rate, near.age, near.pause) = (rate, 0, 1);
+    near.twice += 1;
+    if near.twice >= TWICE && network.system.has_junctions() {
+        (near.twice, near.wait) = (0, CHEAPER);
+    }
     network.add_charge_change(-1.0, &residual[..n], q);
     true
 }

@@ -7,6 +7,7 @@ use super::laws::{LawSet, Registers};
 use super::memory::Memories;
 use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
+use crate::circuit::stamps::Junction;
 use crate::circuit::waveform::Segment;
 use crate::linear::{Lu, Singular};
 
@@ -19,11 +20,45 @@ pub(crate) struct Matrix {
     pub values: Vec<f64>,
     lu: Option<Lu<f64>>,
     work: Vec<f64>,
+    /// The modes that the pivots are for, and pivots that others had.
+    modes: Vec<f64>,
+    kept: Vec<(Vec<f64>, Lu<f64>)>,
 }
+
+/// Pivots are kept for so many sets of modes.
+const MOST_KEPT: usize = 8;
 
 impl Matrix {
     fn new(plan: &MatrixPlan) -> Matrix {
-        Matrix { values: vec![0.0; plan.pattern.len()], lu: None, work: vec![0.0; plan.pattern.n] }
+        Matrix {
+            values: vec![0.0; plan.pattern.len()],
+            lu: None,
+            work: vec![0.0; plan.pattern.n],
+            modes: vec![],
+            kept: vec![],
+        }
+    }
+
+    /// Puts the pivots away for when these modes come back, and takes those that the new ones had.
+    fn change_modes(&mut self, modes: &[f64]) {
+        if let Some(lu) = self.lu.take() {
+            if self.kept.len() >= MOST_KEPT {
+                self.kept.remove(0);
+            }
+            self.kept.push((std::mem::take(&mut self.modes), lu));
+        }
+        if let Some(known) = self.kept.iter().position(|(known, _)| known == modes) {
+            let (known, lu) = self.kept.remove(known);
+            (self.modes, self.lu) = (known, Some(lu));
+        } else {
+            self.modes.clear();
+            self.modes.extend_from_slice(modes);
+        }
+    }
+
+    fn forget(&mut self) {
+        self.lu = None;
+        self.kept.clear();
     }
 
     /// Replays the chosen pivots; chooses new ones where the guard objects.
@@ -66,8 +101,32 @@ struct GroupState {
     values: Vec<f64>,
     partials: Vec<f64>,
     registers: Registers,
-    /// Junction voltage of the last linearisation.
+    /// Junction voltage of the last linearisation, and of the dynamic matrix's factors.
     voltage: f64,
+    factored: f64,
+    /// Of laws that are affine for fixed modes: their values where all unknowns are 0; whether these and the derivatives
+    /// are those of the present modes.
+    constants: Vec<f64>,
+    known: bool,
+}
+
+impl GroupState {
+    /// Values of laws that are affine for fixed modes, worked out anew only where these have changed.
+    fn follow(&mut self, laws: &LawSet, inputs: &mut [f64]) {
+        if !self.known {
+            self.known = true;
+            let places = 0..laws.partials();
+            let moved: Vec<f64> =
+                places.clone().map(|p| std::mem::take(&mut inputs[laws.input(p)])).collect();
+            laws.full(inputs, &mut self.registers, &mut self.constants, &mut self.partials);
+            // One that stands there twice is 0 the second time.
+            places.rev().zip(moved.iter().rev()).for_each(|(p, x)| inputs[laws.input(p)] = *x);
+        }
+        for (o, (value, constant)) in self.values.iter_mut().zip(&self.constants).enumerate() {
+            let terms = laws.row(o).map(|p| self.partials[p] * inputs[laws.input(p)]);
+            *value = terms.fold(*constant, |sum, term| sum + term);
+        }
+    }
 }
 
 /// A system with modes, segments of its sources, and room to compute in.
@@ -123,6 +182,9 @@ impl<'a> Network<'a> {
                 partials: vec![0.0; group.laws.partials()],
                 registers: group.laws.registers(),
                 voltage: 0.0,
+                factored: 0.0,
+                constants: vec![0.0; if group.modal { group.targets.len() } else { 0 }],
+                known: false,
             })
             .collect();
         Network {
@@ -204,7 +266,10 @@ impl<'a> Network<'a> {
         self.statistics.evaluations += 1;
         self.set_inputs(x, t);
         for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
-            group.laws.values(&self.inputs, &mut state.registers, &mut state.values);
+            match group.modal {
+                true => state.follow(&group.laws, &mut self.inputs),
+                false => group.laws.values(&self.inputs, &mut state.registers, &mut state.values),
+            }
         }
     }
 
@@ -220,6 +285,10 @@ impl<'a> Network<'a> {
         let mut limited = false;
         for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
             let laws = &group.laws;
+            if group.modal {
+                state.follow(laws, &mut self.inputs);
+                continue;
+            }
             let Some(junction) = &group.junction else {
                 laws.full(
                     &self.inputs,
@@ -229,10 +298,7 @@ impl<'a> Network<'a> {
                 );
                 continue;
             };
-            let at = |unknown: Option<crate::circuit::stamps::UnknownId>| {
-                unknown.map_or(0.0, |k| x[k.0 as usize])
-            };
-            let voltage = at(junction.across[0]) - at(junction.across[1]);
+            let voltage = voltage_across(junction, |k| x[k]);
             let allowed = if limit {
                 limit_junction(voltage, state.voltage, junction.thermal, junction.critical)
             } else {
@@ -284,8 +350,7 @@ impl<'a> Network<'a> {
     pub fn remember_junctions(&mut self, x: &[f64]) {
         for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
             if let Some(junction) = &group.junction {
-                let [anode, cathode] = junction.across.map(|u| u.map_or(0.0, |k| x[k.0 as usize]));
-                state.voltage = anode - cathode;
+                state.voltage = voltage_across(junction, |k| x[k]);
             }
         }
     }
@@ -457,8 +522,9 @@ impl<'a> Network<'a> {
                     alpha * place.factor * state.partials[place.partial as usize];
             }
         }
+        self.groups.iter_mut().for_each(|state| state.factored = state.voltage);
         let result = self.dynamic.factorise(plan, &mut self.statistics);
-        let constant = result.is_ok() && self.groups.is_empty();
+        let constant = result.is_ok() && self.system.is_linear();
         self.factored_alpha = constant.then_some(alpha);
         self.stage_alpha = result.is_ok().then_some(alpha);
         result
@@ -469,6 +535,29 @@ impl<'a> Network<'a> {
         self.stage_alpha.is_some_and(|known| (known - alpha).abs() <= ABOUT_SAME * alpha)
     }
 
+    /// Whether no junction's conductance at `x` is far from what it was when the factors at hand were made.
+    pub fn junctions_rest(&self, x: &[f64]) -> bool {
+        self.groups.iter().zip(&self.system.groups).all(|(state, group)| {
+            group.junction.is_none_or(|junction| {
+                rests(&junction, &[state.factored, voltage_across(&junction, |k| x[k])])
+            })
+        })
+    }
+
+    /// Whether laws have no kink between where the factors at hand were made and `x`: all is linear but junctions, and they
+    /// rest.
+    pub fn meets_no_kink(&self, x: &[f64]) -> bool {
+        self.system.has_junctions_alone() && self.junctions_rest(x)
+    }
+
+    /// Whether all is linear but junctions, and they rest at all these points.
+    pub fn rests_at<const N: usize>(&self, points: [impl Fn(usize) -> f64; N]) -> bool {
+        self.system.has_junctions_alone()
+            && self.system.groups.iter().filter_map(|group| group.junction).all(|junction| {
+                rests(&junction, &points.each_ref().map(|x| voltage_across(&junction, x)))
+            })
+    }
+
     /// Solves W·y = y in place.
     pub fn solve_dynamic(&mut self, y: &mut [f64]) {
         self.dynamic.solve(&mut self.statistics, y);
@@ -477,7 +566,7 @@ impl<'a> Network<'a> {
     /// Fills and factorises the frozen network. `held` says which charges keep their value; the others have w = 0.
     pub fn factorise_frozen(&mut self, held: &[bool]) -> Result<(), Singular> {
         // An operating point is sought with values of its own on the diagonal.
-        let constant = self.groups.is_empty() && self.gmin == 0.0 && self.pins.is_empty();
+        let constant = self.system.is_linear() && self.gmin == 0.0 && self.pins.is_empty();
         if constant && !held.is_empty() && self.factored_held == held {
             return Ok(());
         }
@@ -544,10 +633,23 @@ impl<'a> Network<'a> {
         self.frozen.solve(&mut self.statistics, y);
     }
 
-    /// Forgets the pivots chosen: the next matrices differ in structure (modes, charges held).
+    /// Forgets the pivots chosen: the next matrices differ in structure (charges held, values out of range).
     pub fn forget_pivots(&mut self) {
-        self.frozen.lu = None;
-        self.dynamic.lu = None;
+        self.frozen.forget();
+        self.dynamic.forget();
+        self.forget_constant_factors();
+    }
+
+    /// Goes on with other pivots: a switch has changed, and the matrices with it by orders of magnitude.
+    pub fn change_pivots(&mut self) {
+        self.frozen.change_modes(&self.modes);
+        self.dynamic.change_modes(&self.modes);
+        self.forget_constant_factors();
+    }
+
+    /// A mode has changed: what follows from modes alone does so anew.
+    pub fn forget_modes(&mut self) {
+        self.groups.iter_mut().for_each(|state| state.known = false);
         self.forget_constant_factors();
     }
 
@@ -710,6 +812,21 @@ fn slopes(laws: &LawSet, inputs: &[f64]) -> (Vec<f64>, Vec<f64>) {
 
 fn device_of(group: &LawGroup, o: usize) -> Option<crate::circuit::DeviceId> {
     group.devices.get(o).copied()
+}
+
+fn voltage_across(junction: &Junction, x: impl Fn(usize) -> f64) -> f64 {
+    let [anode, cathode] = junction.across.map(|u| u.map_or(0.0, |k| x(k.0 as usize)));
+    anode - cathode
+}
+
+/// Whether a junction's conductance is about the same at these voltages.
+fn rests(junction: &Junction, voltages: &[f64]) -> bool {
+    /// In units of n·Vt.
+    const MOVED: f64 = 0.3;
+    let [least, most] = junction.off;
+    let low = voltages.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = voltages.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    high - low <= MOVED * junction.thermal || (low >= least && high <= most)
 }
 
 /// Limits the change of a junction's voltage (L. W. Nagel, SPICE2, ERL-M520, 1975, section 4.2): above the critical

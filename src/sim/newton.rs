@@ -28,6 +28,8 @@ pub(crate) struct Scratch {
     update: Vec<f64>,
     /// The update before.
     before: Vec<f64>,
+    /// Where iterations with factors of an earlier stage began.
+    pub guess: Vec<f64>,
     /// What the second update of a stage is of the first one's square, both weighted, as far as is known: with it, one
     /// iteration tells how far off it is, and no second one need confirm it.
     bend: f64,
@@ -45,6 +47,7 @@ impl Scratch {
             sizes: vec![0.0; n + charges],
             update: vec![0.0; n + charges],
             before: vec![0.0; n + charges],
+            guess: vec![0.0; n],
             bend: f64::INFINITY,
             age: 0,
             near: Near::UNKNOWN,
@@ -155,19 +158,16 @@ pub(crate) fn solve_stage(
         let rate = if iteration == 0 { 0.0 } else { update / before };
         if iteration == 0 {
             scratch.age += 1;
-            let left = GROWN * scratch.bend * update * update;
-            let known = left <= stage.unconfirmed && scratch.age < MEASURED_AGAIN;
-            if known && update <= NEAR && !limited {
-                // Charges go with the linear terms, as the equations just solved have them.
-                for dx in &mut scratch.residual[..n] {
-                    *dx = -*dx;
-                }
-                network.add_charge_change(1.0, &scratch.residual[..n], q);
-                return Ok(());
-            }
         } else if iteration == 1 && before > 0.0 {
             scratch.bend = update / (before * before);
             scratch.age = 0;
+        }
+        let left = GROWN * scratch.bend * update * update;
+        let known = left <= stage.unconfirmed && scratch.age < MEASURED_AGAIN && rate < 1.0;
+        if known && !limited && !damped && (update <= NEAR || network.meets_no_kink(x)) {
+            // Charges go with the linear terms, as the equations just solved have them.
+            network.add_charge_change(-1.0, &scratch.residual[..n], q);
+            return Ok(());
         }
         damping = rate >= 0.5;
         let done = match iteration {

@@ -95,7 +95,7 @@ impl<'a> Rows<'a> {
             spare: (0..MOST_HALVED + 2).map(|_| vec![0.0; columns + 1]).collect(),
             low: vec![f64::INFINITY; columns],
             high: vec![f64::NEG_INFINITY; columns],
-            inside: Inside::new(network),
+            inside: Inside::of_outputs(network),
         }
     }
 
@@ -215,12 +215,16 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
-        // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
-        // only what is written is solved for. Within the long steps of methods of higher order what follows a source
-        // moves in ways that their polynomials do not say, unless that is straight and all is linear.
-        let by_past = work.dense.by_past && !network.system.output_rates;
-        let smooth = !index2 && (by_past || network.is_straight());
-        let parabolic = by_past && network.system.law_columns.is_empty();
+        // Whether columns are straight is read off parabolas of the unknowns, where steps are short enough for them; only
+        // what is written is solved for. Within the long steps of methods of higher order what follows a source moves in
+        // ways that their polynomials do not say, unless that is straight and all is linear.
+        let parabolas = !index2
+            && !network.system.output_rates
+            && (work.dense.by_past
+                || work.dense.by_unknowns
+                    && !self.inside.is_rough(network, from, to, weights, work));
+        let smooth = parabolas || (!index2 && network.is_straight());
+        let parabolic = parabolas && network.system.law_columns.is_empty();
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;

@@ -2,6 +2,7 @@
 
 mod bound;
 mod crossing;
+mod first;
 pub(super) mod past;
 mod restart;
 mod rounding;
@@ -11,6 +12,7 @@ mod trouble;
 
 use self::bound::Bound;
 use self::crossing::{Crossed, Located, Search};
+use self::first::First;
 use self::rounding::Rounding;
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
@@ -181,6 +183,10 @@ struct Run<'a> {
     /// Whether no step has been accepted since the last restart, and whether its fast layer has been passed over.
     fresh: bool,
     smoothed: bool,
+    /// What did after corners and events.
+    first: First,
+    /// The end of the last step that failed.
+    wall: f64,
     /// The method to come back to, and after how many steps; 0 where there is nothing to come back from.
     home: Method,
     detour: u32,
@@ -241,6 +247,8 @@ impl<'a> Run<'a> {
             last: None,
             fresh: true,
             smoothed: false,
+            first: First::new(),
+            wall: 0.0,
             home: settings.method,
             detour: 0,
             bound: Bound::default(),
@@ -284,7 +292,7 @@ impl<'a> Run<'a> {
         let mut power = self.method.error_power();
         let limit = self.settings.hmax.unwrap_or(f64::INFINITY).min(self.sight);
         let limit = limit.min(self.network.memories.longest_step());
-        let planned = self.h.min(limit);
+        let planned = self.before_wall(self.h).min(limit);
         let mut h = planned;
         let mut bounded = false;
         let mut search = Search::default();
@@ -378,6 +386,7 @@ impl<'a> Run<'a> {
                 }
             };
             failed = true;
+            self.wall = self.next.t;
             bounded = false;
             search = Search::default();
             let hopeless = h < (LAYER * remaining).max(self.smallest);
@@ -446,6 +455,7 @@ impl<'a> Run<'a> {
         let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };
         self.work.unconfirmed = left;
         let factor = self.factor(error, h, failed, power);
+        self.learn_first(factor * h);
         // A step that was clipped says little against the size that had been planned.
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };
         if let Some(rows) = &mut self.rows {

@@ -62,6 +62,8 @@ pub(crate) struct LawGroup {
     pub charge_slopes: Vec<(u32, u32, u32)>,
     /// The junction whose voltage is limited.
     pub junction: Option<Junction>,
+    /// Whether its laws are affine for fixed modes.
+    pub modal: bool,
     /// Devices of the values, for messages.
     pub devices: Vec<DeviceId>,
 }
@@ -204,9 +206,14 @@ impl System {
         self.groups.iter().any(|group| group.junction.is_some())
     }
 
+    /// Whether nothing but junctions is non-linear (for fixed modes).
+    pub fn has_junctions_alone(&self) -> bool {
+        self.groups.iter().all(|group| group.modal || group.junction.is_some())
+    }
+
     /// Whether every equation is linear with constant coefficients (for fixed modes).
     pub fn is_linear(&self) -> bool {
-        self.groups.is_empty()
+        self.groups.iter().all(|group| group.modal)
     }
 
     /// A device's name.

@@ -584,6 +584,50 @@ fn a_switch_that_contradicts_itself_is_named() {
 }
 
 #[test]
+fn switches_take_back_the_pivots_they_had() {
+    let switch = DeviceKind::Switch {
+        control: Box::new(volt(3, 0)),
+        on: 0.6,
+        off: 0.4,
+        on_resistance: 1.0,
+        off_resistance: 1e9,
+        initially_on: None,
+    };
+    let (period, width, edge) = (1e-3, 5e-4, 1e-6);
+    let (low, high, delay) = (0.0, 1.0, 0.0);
+    let gate = Waveform::Pulse { low, high, delay, rise: edge, fall: edge, width, period };
+    let system = system(vec![
+        ("V1", vec![1, 0], dc(10.0)),
+        ("V2", vec![3, 0], v(gate)),
+        ("S1", vec![1, 2], switch),
+        ("R1", vec![2, 0], r(1.0)),
+        ("L1", vec![2, 0], l(1e-3, 0.0)),
+    ]);
+    // Closed the current tends to 10 A within 2 ms, open to 0 within 1 ms.
+    let exact = |t: f64| {
+        let (mut now, mut current) = (0.0, 0.0);
+        for cycle in 0..10 {
+            let begin = f64::from(cycle) * period;
+            let corners = [begin + 0.6 * edge, begin + edge + width + 0.6 * edge, begin + period];
+            for (corner, (end, tau)) in corners.iter().zip([(0.0, 1e-3), (10.0, 2e-3), (0.0, 1e-3)])
+            {
+                let until = corner.min(t);
+                current = end + (current - end) * ((now - until) / tau).exp();
+                now = until;
+            }
+        }
+        current
+    };
+    for method in [Method::Auto, Method::TrBdf2] {
+        let (trace, statistics) = run(&system, &Settings { method, ..grid(1e-2, 1e-5, 1e-6) });
+        assert!(worst(&trace, "i(l1)", exact) < 1e-3, "{statistics}");
+        assert_eq!(statistics.events, 20, "{statistics}");
+        // Two matrices, two modes, and a guard that may object once in each.
+        assert!(statistics.factorisations <= 8, "{statistics}");
+    }
+}
+
+#[test]
 fn floating_nodes_and_loops_of_sources_are_named() {
     let found = errors(vec![
         ("V1", vec![1, 0], dc(1.0)),

@@ -75,7 +75,8 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     let critical = thermal * (thermal / (std::f64::consts::SQRT_2 * diode.saturation)).ln();
     let law = conduction(&diode, across);
     if !into.is_empty() {
-        let junction = Some(Junction { across, thermal, critical });
+        let off = [-diode.breakdown.unwrap_or(f64::INFINITY), -5.0 * thermal];
+        let junction = Some(Junction { across, thermal, critical, off });
         stamper.stamps.laws.push(LawStamp { device: id, law, into: into.clone(), junction });
     }
     let stored = storage(&diode, across);

@@ -83,6 +83,26 @@ impl History {
         }
     }
 
+    /// Puts the prediction for a step's end into `to.x`, from its left end, a point within it and the point before.
+    pub fn predict_on(&self, from: &State, inner: &[f64], time: f64, to: &mut State) {
+        let (h, part) = (to.t - from.t, time - from.t);
+        let on = h / part;
+        if self.count == 0 {
+            for ((to, from), inner) in to.x.iter_mut().zip(&from.x).zip(inner) {
+                *to = from + on * (inner - from);
+            }
+            return;
+        }
+        // x₀ + h·x[t₀, t] + h·(h − p)·x[t₀, t, t₋₁]
+        let last = from.t - self.times[0];
+        let bend = h * (h - part) / (part + last);
+        let (a, b) = (on + bend / part, bend / last);
+        let points = to.x.iter_mut().zip(&from.x).zip(inner).zip(&self.x[0]);
+        for (((to, from), inner), before) in points {
+            *to = from + a * (inner - from) - b * (from - before);
+        }
+    }
+
     /// k₁ of the parabolas through the point before, and the two ends of a step; 0 where there is no point before.
     pub fn bend(&self, from: &State, to: &State, k: &mut [f64]) {
         if self.count == 0 {

@@ -34,23 +34,23 @@ pub(crate) fn step(
     let h = to.t - from.t;
     let alpha = 1.0 / (D * h);
     let unconfirmed = work.unconfirmed;
-    let Work { x, q, w, beta, sum, error, rate_weights, rate_floors, dense, scratch, .. } = work;
+    let Work {
+        x, q, w, beta, sum, error, rate_weights, rate_floors, dense, scratch, history, ..
+    } = work;
 
-    x.copy_from_slice(&from.x);
-    network.remember_junctions(x);
+    let middle = from.t + GAMMA * h;
+    history.predict(from, middle, x);
+    network.remember_junctions(&from.x);
     for (k, beta) in beta.iter_mut().enumerate() {
         *beta = -alpha * from.q[k] - from.w[k];
     }
-    let middle = from.t + GAMMA * h;
     let stage = Stage { t: middle, alpha, beta, weights, tolerance: ITERATION, unconfirmed };
     solve_stage(network, &stage, x, q, scratch)?;
     for (k, w) in w.iter_mut().enumerate() {
         *w = alpha * q[k] + beta[k];
     }
 
-    for (to, (from, middle)) in to.x.iter_mut().zip(from.x.iter().zip(x.iter())) {
-        *to = from + (middle - from) / GAMMA;
-    }
+    history.predict_on(from, x, middle, to);
     for (k, beta) in beta.iter_mut().enumerate() {
         *beta = -alpha * (from.q[k] + h * W * (from.w[k] + w[k]));
     }

@@ -1,5 +1,6 @@
 //! The method that suits a step limit: where the limit, not the error, sets the step, a method of fourth or fifth order
-//! pays for stages that gain nothing, and the trapezoidal rule takes the same steps with one solution each.
+//! pays for stages that gain nothing, and the trapezoidal rule takes the same steps with one solution each. So it does for
+//! TR-BDF2 with two, from when all that is fast has died out until something happens.
 
 use super::Run;
 use crate::sim::methods::{Method, SMOOTH};
@@ -14,6 +15,9 @@ const LARGE: f64 = 0.3;
 /// where that is less than this part of the limit, so many times more often than not, the other method comes back.
 const SHORT: f64 = 0.2;
 const STRUGGLES: u32 = 20;
+/// Of TR-BDF2, which is left for as long as a stretch between corners lasts at most, so many steps that the limit binds
+/// will do.
+const BOUND_AT_ONCE: u32 = 2;
 /// Each time it comes back the limit must bind this many times as long.
 const PATIENCE: u32 = 2;
 
@@ -31,8 +35,7 @@ pub(super) struct Bound {
 }
 
 impl Run<'_> {
-    /// Changes the method where the step limit says so, and back. Only one that nobody asked for is changed, and one of
-    /// a circuit without junctions: theirs is of second order already.
+    /// Changes the method where the step limit says so, and back. Only one that nobody asked for is changed.
     pub(super) fn suit_limit(&mut self, error: f64, h: f64) {
         let limit = match self.settings.hmax {
             Some(limit) if self.settings.method == Method::Auto && self.detour == 0 => limit,
@@ -52,6 +55,16 @@ impl Run<'_> {
                     self.go_on_with(Method::Trapezoidal, "the step limit binds");
                 }
             }
+            None if self.method == Method::TrBdf2 && !self.index2 => {
+                let binds = error < SMALL && h > 0.99 * limit;
+                bound.bound = if binds { bound.bound + 1 } else { 0 };
+                if bound.bound >= BOUND_AT_ONCE {
+                    (bound.left, bound.bound) = (Some(self.method), 0);
+                    self.method = Method::Trapezoidal;
+                }
+            }
+            Some(Method::TrBdf2) if error > LARGE || h < SHORT * limit => self.leave_bound(),
+            Some(Method::TrBdf2) => {}
             Some(other) if self.method == Method::Trapezoidal => {
                 if error > LARGE && h < SHORT * limit {
                     bound.struggles += 1;
@@ -65,6 +78,14 @@ impl Run<'_> {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Something happens: back to TR-BDF2, where the limit has led away from it.
+    pub(super) fn leave_bound(&mut self) {
+        if self.bound.left == Some(Method::TrBdf2) {
+            self.bound = Bound { returns: self.bound.returns, ..Bound::default() };
+            self.method = Method::TrBdf2;
         }
     }
 

@@ -351,7 +351,7 @@ impl Run<'_> {
         }
         *count += 1;
         let crowded = *count > CROWD;
-        let Run { network, controls, crossed, settings, .. } = self;
+        let Run { network, controls, crossed, settings, first, .. } = self;
         if crowded && !network.is_condition(mode) {
             let trouble = Trouble::Modes(network.system.modes[mode].device);
             let time = self.state.t;
@@ -367,6 +367,7 @@ impl Run<'_> {
         let (a, b) = events::pair(&controls.left, mode);
         let value = network.next_value(mode, a, b);
         let slides = network.flip(mode, value, a, b) || crowded;
+        first.event(mode, value);
         // Others that have come to their thresholds in the same step, on their way across.
         for other in crossed.iter().map(|crossed| crossed.mode).filter(|other| *other != mode) {
             let (a, b) = events::pair(&controls.left, other);

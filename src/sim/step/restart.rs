@@ -87,6 +87,7 @@ impl Run<'_> {
 
     /// Consistent values for the charges of `state`.
     pub(super) fn restart(&mut self, moment: Moment) -> Result<(), Failure> {
+        self.leave_bound();
         self.work.history.forget();
         self.rounding.forget();
         self.work.scratch.forget_bend();
@@ -331,6 +332,7 @@ impl Run<'_> {
     /// Moves sources to their next segments and finds the values after the corner.
     pub(super) fn pass_corner(&mut self) -> Result<(), Failure> {
         self.network.pass_corner(self.state.t, self.smallest);
+        self.first.corner(&self.network, self.state.t, self.smallest);
         let events = self.network.statistics.events;
         let before = self.rows.is_some().then(|| self.state.x.clone());
         self.restart(Moment::Restart)?;
@@ -345,11 +347,5 @@ impl Run<'_> {
                 .any(|((a, b), weight)| (a - b).abs() > *weight)
         });
         if jumped || self.network.statistics.events != events { self.row_here() } else { Ok(()) }
-    }
-
-    /// A careful first step after a corner or event.
-    pub(super) fn shorten(&mut self) {
-        let span = self.distance();
-        self.h = (0.5 * self.h).min(0.1 * span).max(self.smallest);
     }
 }

@@ -16,6 +16,16 @@ pub(super) fn after_error(error: f64, power: f64) -> f64 {
 }
 
 impl Run<'_> {
+    /// A step on the way to where the last one failed: something happens before that, which errors do not show until it
+    /// does. Half of the way is gone at most, or as much as the step before went.
+    pub(super) fn before_wall(&self, h: f64) -> f64 {
+        let way = self.wall - self.state.t;
+        match self.last {
+            Some((_, last)) if way > 0.0 => h.min((0.5 * way).max(last)),
+            _ => h,
+        }
+    }
+
     /// The factor by which the next step is longer than this one, which had `error` in parts of its tolerance.
     pub(super) fn factor(&mut self, error: f64, h: f64, failed: bool, power: f64) -> f64 {
         // Gear's method is stable while steps grow by less than 1 + √2.

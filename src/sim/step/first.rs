@@ -1,0 +1,97 @@
+//! The first step after a corner or event, from what did after the last one of its kind: a switch that closes under the
+//! same diode, a pulse that rises again.
+
+use super::Run;
+use crate::sim::network::Network;
+
+/// So many kinds are known at once; a new one takes the place of the one known longest.
+const KINDS: usize = 16;
+
+/// Values and slopes of a source that differ by no more than this part of their size are the same.
+const SAME: f64 = 1e-6;
+
+/// What ends a stretch of steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// A source, its value and its slope after the corner.
+    Corner(usize, f64, f64),
+    /// A mode and its value after the event.
+    Event(usize, f64),
+}
+
+impl Kind {
+    fn is_like(self, other: Kind) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
+        match (self, other) {
+            (Kind::Corner(k, value, slope), Kind::Corner(j, other, other_slope)) => {
+                k == j && same(value, other) && same(slope, other_slope)
+            }
+            (Kind::Event(..), Kind::Event(..)) => self == other,
+            _ => false,
+        }
+    }
+}
+
+/// Kinds of corners and events, each with the step that did after it.
+#[derive(Debug, Default)]
+pub(super) struct First {
+    known: Vec<(Kind, Option<f64>)>,
+    /// The next to be forgotten.
+    oldest: usize,
+    /// That of the last corner or event.
+    present: Option<usize>,
+}
+
+impl First {
+    pub fn new() -> First {
+        First { known: Vec::with_capacity(KINDS), ..First::default() }
+    }
+
+    /// The corner that sources have just passed: the first of those whose segment begins there.
+    pub fn corner(&mut self, network: &Network, t: f64, slack: f64) {
+        let mut segments = network.segments.iter();
+        let found = segments.position(|segment| (segment.start - t).abs() <= slack);
+        self.present = found.map(|k| {
+            let segment = &network.segments[k];
+            let at = segment.start;
+            self.place(Kind::Corner(k, segment.value(at), segment.derivative(at)))
+        });
+    }
+
+    /// The event that has just changed a mode.
+    pub fn event(&mut self, mode: usize, value: f64) {
+        self.present = Some(self.place(Kind::Event(mode, value)));
+    }
+
+    /// The place of a kind, a new one where it is not known.
+    fn place(&mut self, kind: Kind) -> usize {
+        if let Some(place) = self.known.iter().position(|(known, _)| known.is_like(kind)) {
+            return place;
+        }
+        if self.known.len() < KINDS {
+            self.known.push((kind, None));
+            return self.known.len() - 1;
+        }
+        let place = self.oldest;
+        self.oldest = (place + 1) % KINDS;
+        self.known[place] = (kind, None);
+        place
+    }
+}
+
+impl Run<'_> {
+    /// A careful first step after a corner or event, or one that its last of the kind says would do.
+    pub(super) fn shorten(&mut self) {
+        let span = self.distance();
+        let known = self.first.present.and_then(|place| self.first.known[place].1);
+        let most = known.unwrap_or(0.1 * span);
+        self.h = (0.5 * self.h).min(most).max(self.smallest);
+    }
+
+    /// The first step after a corner or event says how long the next one of its kind may be.
+    pub(super) fn learn_first(&mut self, h: f64) {
+        if let Some(place) = self.first.present.take() {
+            self.first.known[place].1 = Some(h);
+        }
+    }
+}
