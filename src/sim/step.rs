@@ -387,6 +387,7 @@ impl<'a> Run<'a> {
             };
             failed = true;
             self.wall = self.next.t;
+            self.leave_bound();
             bounded = false;
             search = Search::default();
             let hopeless = h < (LAYER * remaining).max(self.smallest);
