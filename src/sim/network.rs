@@ -61,6 +61,13 @@ impl Matrix {
         self.kept.clear();
     }
 
+    /// The first pivots are for the modes that the run begins with.
+    fn begin(&mut self, modes: &[f64]) {
+        if self.modes.is_empty() {
+            self.modes.extend_from_slice(modes);
+        }
+    }
+
     /// Replays the chosen pivots; chooses new ones where the guard objects.
     fn factorise(
         &mut self,
@@ -523,6 +530,7 @@ impl<'a> Network<'a> {
             }
         }
         self.groups.iter_mut().for_each(|state| state.factored = state.voltage);
+        self.dynamic.begin(&self.modes);
         let result = self.dynamic.factorise(plan, &mut self.statistics);
         let constant = result.is_ok() && self.system.is_linear();
         self.factored_alpha = constant.then_some(alpha);
@@ -608,6 +616,7 @@ impl<'a> Network<'a> {
                 }
             }
         }
+        self.frozen.begin(&self.modes);
         self.frozen.factorise(plan, &mut self.statistics)?;
         if constant {
             self.factored_held.extend_from_slice(held);

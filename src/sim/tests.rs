@@ -622,7 +622,7 @@ fn switches_take_back_the_pivots_they_had() {
         let (trace, statistics) = run(&system, &Settings { method, ..grid(1e-2, 1e-5, 1e-6) });
         assert!(worst(&trace, "i(l1)", exact) < 1e-3, "{statistics}");
         assert_eq!(statistics.events, 20, "{statistics}");
-        // Two matrices, two modes, and a guard that may object once in each.
+        // Two passes, two matrices, two modes.
         assert!(statistics.factorisations <= 8, "{statistics}");
     }
 }
