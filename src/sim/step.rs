@@ -456,7 +456,7 @@ impl<'a> Run<'a> {
         let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };
         self.work.unconfirmed = left;
         let factor = self.factor(error, h, failed, power);
-        self.learn_first(factor * h);
+        self.learn_first(factor * h, failed);
         // A step that was clipped says little against the size that had been planned.
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };
         if let Some(rows) = &mut self.rows {
