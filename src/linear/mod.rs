@@ -6,9 +6,11 @@
 //! Pivots are chosen by Markowitz's rule with a threshold up to [`lu::SMALL`] unknowns, beyond that column by column
 //! in an order of minimum degree (T. A. Davis, *Direct Methods for Sparse Linear Systems*, 2006).
 
+mod cholesky;
 mod choose;
 mod components;
 mod degree;
+mod factors;
 mod field;
 mod flat;
 mod gilbert;
@@ -19,13 +21,19 @@ mod pattern;
 mod pivots;
 pub mod relations;
 pub mod roots;
+mod singletons;
 pub mod symmetric;
+#[cfg(test)]
+mod mesh_tests;
 #[cfg(test)]
 mod tests;
 
+pub use cholesky::Orders;
 pub use components::components;
+pub use factors::Factors;
 pub use field::{Complex, Field, Prime, Prime61, Prime62};
 pub use lu::{Lu, SMALL, Trouble, backward_error};
 pub use matching::{Matching, maximum_matching};
 pub use pattern::Pattern;
 pub use pivots::{Cause, Singular};
+pub use singletons::Unfit;

@@ -5,7 +5,7 @@ use super::*;
 use proptest::prelude::*;
 
 /// splitmix64: test data only.
-struct Random(u64);
+pub(super) struct Random(pub u64);
 
 impl Random {
     fn next(&mut self) -> u64 {
@@ -15,35 +15,35 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
-    fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }
     /// In (-1, 1).
-    fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
-    fn decade(&mut self, low: f64, high: f64) -> f64 {
+    pub fn decade(&mut self, low: f64, high: f64) -> f64 {
         10f64.powf(low + (high - low) * (self.unit() + 1.0) / 2.0)
     }
 }
 
 #[derive(Default)]
-struct Matrix {
-    n: usize,
-    places: Vec<(u32, u32)>,
-    values: Vec<f64>,
+pub(super) struct Matrix {
+    pub n: usize,
+    pub places: Vec<(u32, u32)>,
+    pub values: Vec<f64>,
 }
 
 impl Matrix {
-    fn new(n: usize) -> Matrix {
+    pub fn new(n: usize) -> Matrix {
         Matrix { n, ..Matrix::default() }
     }
-    fn add(&mut self, row: usize, column: usize, value: f64) {
+    pub fn add(&mut self, row: usize, column: usize, value: f64) {
         self.places.push((row as u32, column as u32));
         self.values.push(value);
     }
     /// A conductance between two nodes; node `usize::MAX` is ground.
-    fn conductance(&mut self, a: usize, b: usize, g: f64) {
+    pub fn conductance(&mut self, a: usize, b: usize, g: f64) {
         for (i, j, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
             if i != usize::MAX && j != usize::MAX && (i == j) == (sign > 0.0) {
                 self.add(i, j, sign * g);
@@ -51,7 +51,7 @@ impl Matrix {
         }
     }
     /// A branch with its own current: v(a) − v(b) − r·i = …
-    fn branch(&mut self, a: usize, b: usize, row: usize, r: f64) {
+    pub fn branch(&mut self, a: usize, b: usize, row: usize, r: f64) {
         for (node, sign) in [(a, 1.0), (b, -1.0)] {
             if node != usize::MAX {
                 self.add(node, row, sign);
@@ -62,7 +62,7 @@ impl Matrix {
             self.add(row, row, -r);
         }
     }
-    fn pattern(&self) -> (Pattern, Vec<f64>) {
+    pub fn pattern(&self) -> (Pattern, Vec<f64>) {
         let (pattern, slots) = Pattern::from_triplets(self.n, &self.places);
         let mut values = vec![0.0; pattern.len()];
         for (&slot, &value) in slots.iter().zip(&self.values) {
@@ -70,7 +70,7 @@ impl Matrix {
         }
         (pattern, values)
     }
-    fn dense(&self) -> nalgebra::DMatrix<f64> {
+    pub fn dense(&self) -> nalgebra::DMatrix<f64> {
         let mut dense = nalgebra::DMatrix::zeros(self.n, self.n);
         for (&(i, j), &value) in self.places.iter().zip(&self.values) {
             dense[(i as usize, j as usize)] += value;
@@ -79,10 +79,10 @@ impl Matrix {
     }
 }
 
-const KINDS: usize = 6;
+pub(super) const KINDS: usize = 6;
 
 /// Random systems: sparse with a diagonal, permuted ones, badly scaled ones, circuits with sources, ladders, arrows.
-fn random(kind: usize, n: usize, random: &mut Random) -> Matrix {
+pub(super) fn random(kind: usize, n: usize, random: &mut Random) -> Matrix {
     let mut m = Matrix::new(n);
     match kind {
         0..=2 => {
@@ -146,7 +146,7 @@ fn random(kind: usize, n: usize, random: &mut Random) -> Matrix {
     m
 }
 
-fn condition(dense: &nalgebra::DMatrix<f64>) -> f64 {
+pub(super) fn condition(dense: &nalgebra::DMatrix<f64>) -> f64 {
     // After scaling rows and columns, which is what a good answer depends on.
     let mut a = dense.clone();
     for _ in 0..4 {

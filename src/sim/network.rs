@@ -9,7 +9,7 @@ use super::statistics::Statistics;
 use super::system::{LawGroup, MatrixPlan, System, Target};
 use crate::circuit::stamps::Junction;
 use crate::circuit::waveform::Segment;
-use crate::linear::{Lu, Singular};
+use crate::linear::{Factors, Orders, Singular, Unfit};
 
 /// The conductance that pins a node to its `.ic` value, as in SPICE.
 const PIN: f64 = 1e10;
@@ -18,11 +18,12 @@ const PIN: f64 = 1e10;
 #[derive(Debug)]
 pub(crate) struct Matrix {
     pub values: Vec<f64>,
-    lu: Option<Lu<f64>>,
-    work: Vec<f64>,
+    factors: Option<Factors>,
+    /// Whether entries that were 0 have become others.
+    changes: bool,
     /// The modes that the pivots are for, and pivots that others had.
     modes: Vec<f64>,
-    kept: Vec<(Vec<f64>, Lu<f64>)>,
+    kept: Vec<(Vec<f64>, Factors)>,
 }
 
 /// Pivots are kept for so many sets of modes.
@@ -32,8 +33,8 @@ impl Matrix {
     fn new(plan: &MatrixPlan) -> Matrix {
         Matrix {
             values: vec![0.0; plan.pattern.len()],
-            lu: None,
-            work: vec![0.0; plan.pattern.n],
+            factors: None,
+            changes: false,
             modes: vec![],
             kept: vec![],
         }
@@ -41,15 +42,15 @@ impl Matrix {
 
     /// Puts the pivots away for when these modes come back, and takes those that the new ones had.
     fn change_modes(&mut self, modes: &[f64]) {
-        if let Some(lu) = self.lu.take() {
+        if let Some(factors) = self.factors.take() {
             if self.kept.len() >= MOST_KEPT {
                 self.kept.remove(0);
             }
-            self.kept.push((std::mem::take(&mut self.modes), lu));
+            self.kept.push((std::mem::take(&mut self.modes), factors));
         }
         if let Some(known) = self.kept.iter().position(|(known, _)| known == modes) {
-            let (known, lu) = self.kept.remove(known);
-            (self.modes, self.lu) = (known, Some(lu));
+            let (known, factors) = self.kept.remove(known);
+            (self.modes, self.factors) = (known, Some(factors));
         } else {
             self.modes.clear();
             self.modes.extend_from_slice(modes);
@@ -57,7 +58,7 @@ impl Matrix {
     }
 
     fn forget(&mut self) {
-        self.lu = None;
+        self.factors = None;
         self.kept.clear();
     }
 
@@ -72,32 +73,32 @@ impl Matrix {
     fn factorise(
         &mut self,
         plan: &MatrixPlan,
+        orders: &mut Orders,
         statistics: &mut Statistics,
     ) -> Result<(), Singular> {
-        if let Some(lu) = &mut self.lu {
+        if let Some(factors) = &mut self.factors {
             statistics.refactorisations += 1;
-            if lu.refactor(&self.values).is_ok() {
-                return Ok(());
+            match factors.refactor(&self.values) {
+                Ok(()) => {
+                    statistics.symmetric += u64::from(factors.is_symmetric());
+                    return Ok(());
+                }
+                Err(unfit) => self.changes |= unfit == Unfit::Entry,
             }
         }
         statistics.factorisations += 1;
-        match Lu::factor(&plan.pattern, &self.values) {
-            Ok(lu) => {
-                self.lu = Some(lu);
-                Ok(())
-            }
-            Err(singular) => {
-                self.lu = None;
-                Err(singular)
-            }
-        }
+        self.factors = None;
+        let factors = Factors::new(&plan.pattern, &self.values, self.changes, orders)?;
+        statistics.symmetric += u64::from(factors.is_symmetric());
+        self.factors = Some(factors);
+        Ok(())
     }
 
     /// Solves in place.
     fn solve(&mut self, statistics: &mut Statistics, vector: &mut [f64]) {
         statistics.solves += 1;
-        if let Some(lu) = &self.lu {
-            lu.solve(vector, &mut self.work);
+        if let Some(factors) = &mut self.factors {
+            factors.solve(vector);
         }
     }
 }
@@ -164,6 +165,8 @@ pub(crate) struct Network<'a> {
     groups: Vec<GroupState>,
     dynamic: Matrix,
     frozen: Matrix,
+    /// Orders of elimination worked out so far.
+    pub orders: Orders,
     /// α of the factorised dynamic matrix, where it depends on nothing else.
     factored_alpha: Option<f64>,
     /// α of the factors at hand, whatever else they depend on.
@@ -212,6 +215,7 @@ impl<'a> Network<'a> {
             groups,
             dynamic: Matrix::new(&system.dynamic),
             frozen: Matrix::new(&system.frozen),
+            orders: Orders::default(),
             factored_alpha: None,
             stage_alpha: None,
             factored_held: vec![],
@@ -531,11 +535,16 @@ impl<'a> Network<'a> {
         }
         self.groups.iter_mut().for_each(|state| state.factored = state.voltage);
         self.dynamic.begin(&self.modes);
-        let result = self.dynamic.factorise(plan, &mut self.statistics);
+        let result = self.dynamic.factorise(plan, &mut self.orders, &mut self.statistics);
         let constant = result.is_ok() && self.system.is_linear();
         self.factored_alpha = constant.then_some(alpha);
         self.stage_alpha = result.is_ok().then_some(alpha);
         result
+    }
+
+    /// Whether the factors at hand are of use for another step of the same length, and dear to make.
+    pub fn favours_equal_steps(&self) -> bool {
+        self.system.is_linear() && self.dynamic.factors.as_ref().is_some_and(Factors::is_symmetric)
     }
 
     /// Whether the factors at hand are those of about the same α.
@@ -617,7 +626,7 @@ impl<'a> Network<'a> {
             }
         }
         self.frozen.begin(&self.modes);
-        self.frozen.factorise(plan, &mut self.statistics)?;
+        self.frozen.factorise(plan, &mut self.orders, &mut self.statistics)?;
         if constant {
             self.factored_held.extend_from_slice(held);
         }

@@ -29,6 +29,9 @@ pub struct Statistics {
     pub factorisations: u64,
     /// Factorisations that replayed the chosen pivots.
     pub refactorisations: u64,
+    /// How many of both were those of a symmetric matrix, without a choice of pivots.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub symmetric: u64,
     /// Solutions of a linear system.
     pub solves: u64,
     /// Newton iterations of implicit steps, of starts and of operating points.
@@ -48,6 +51,10 @@ pub struct Statistics {
     /// What whoever started the run should know.
     #[serde(skip)]
     pub warnings: Vec<Diagnostic>,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// Why steps were cut.
@@ -89,6 +96,7 @@ impl Statistics {
         self.jacobians += other.jacobians;
         self.factorisations += other.factorisations;
         self.refactorisations += other.refactorisations;
+        self.symmetric += other.symmetric;
         self.solves += other.solves;
         self.iterations += other.iterations;
     }
@@ -140,11 +148,15 @@ impl fmt::Display for Statistics {
             writeln!(f, "pilot pass       {} steps", self.pilot)?;
         }
         writeln!(f, "evaluations      {} ({} with derivatives)", self.evaluations, self.jacobians)?;
-        writeln!(
+        write!(
             f,
             "factorisations   {} new, {} replayed",
             self.factorisations, self.refactorisations
         )?;
+        match self.symmetric {
+            0 => writeln!(f)?,
+            count => writeln!(f, ", {count} of them by Cholesky")?,
+        }
         writeln!(f, "solves           {}", self.solves)?;
         writeln!(f, "iterations       {}", self.iterations)?;
         writeln!(f, "corners, events  {}, {}", self.corners, self.events)?;

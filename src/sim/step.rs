@@ -83,7 +83,8 @@ pub fn transient(
         let mut run = Run::new(system, &coarse, None, None);
         match run.run() {
             Ok(()) => {
-                pilot = Some((run.largest, run.network.statistics, run.network.tracks));
+                let Network { statistics, tracks, orders, .. } = run.network;
+                pilot = Some((run.largest, statistics, tracks, orders));
             }
             Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
             // The real run will say what is wrong, if anything is.
@@ -92,10 +93,11 @@ pub fn transient(
     }
     let magnitudes = pilot.as_ref().map(|(largest, ..)| largest.as_slice());
     let mut run = Run::new(system, settings, magnitudes, Some(sink));
-    if let Some((_, statistics, tracks)) = &pilot {
-        let known = run.network.tracks.iter_mut().zip(tracks);
+    if let Some((_, statistics, tracks, orders)) = pilot {
+        let known = run.network.tracks.iter_mut().zip(&tracks);
         known.for_each(|(track, known)| track.learn(known));
-        run.network.statistics.add_work(statistics);
+        run.network.statistics.add_work(&statistics);
+        run.network.orders = orders;
         run.network.statistics.pilot = statistics.accepted;
     }
     run.run()?;

@@ -15,6 +15,9 @@ pub(super) fn after_error(error: f64, power: f64) -> f64 {
     (SAFETY * methods::growth(error, power)).clamp(0.1, 0.9)
 }
 
+/// Where factors are dear, a step that could change by these factors keeps its length.
+const KEPT: std::ops::Range<f64> = 0.95..1.7;
+
 impl Run<'_> {
     /// A step on the way to where the last one failed: something happens before that, which errors do not show until it
     /// does. Half of the way is gone at most, or as much as the step before went.
@@ -44,6 +47,7 @@ impl Run<'_> {
             let trend = h / last_h * methods::growth(size / last_error, power);
             factor = factor.min(factor * trend.max(LEAST)).max(LEAST);
         }
-        factor.clamp(LEAST, most_allowed)
+        let keeps = KEPT.contains(&factor) && self.network.favours_equal_steps();
+        if keeps && !failed { 1.0 } else { factor.clamp(LEAST, most_allowed) }
     }
 }
