@@ -311,7 +311,7 @@ fn alike(a: f64, b: f64) -> bool {
 fn inverse(pivot: f64, diagonal: f64) -> Result<f64, Unfit> {
     let ratio = pivot / diagonal;
     // Not for a NaN either.
-    if ratio >= LOST && ratio <= GROWN { Ok(1.0 / pivot) } else { Err(Unfit::Values) }
+    if (LOST..=GROWN).contains(&ratio) { Ok(1.0 / pivot) } else { Err(Unfit::Values) }
 }
 
 /// L·D·Lᵀ·x = b in place; in each column the diagonal comes first.

@@ -3,105 +3,17 @@
 //! All buffers are made once; nothing here allocates while a run steps.
 
 use super::events::Track;
+use super::junctions::{limit_junction, rests, voltage_across};
 use super::laws::{LawSet, Registers};
+use super::matrix::Matrix;
 use super::memory::Memories;
 use super::statistics::Statistics;
-use super::system::{LawGroup, MatrixPlan, System, Target};
-use crate::circuit::stamps::Junction;
+use super::system::{LawGroup, System, Target};
 use crate::circuit::waveform::Segment;
-use crate::linear::{Factors, Orders, Singular, Unfit};
+use crate::linear::{Orders, Singular};
 
 /// The conductance that pins a node to its `.ic` value, as in SPICE.
 const PIN: f64 = 1e10;
-
-/// A matrix of fixed pattern with its factors.
-#[derive(Debug)]
-pub(crate) struct Matrix {
-    pub values: Vec<f64>,
-    factors: Option<Factors>,
-    /// Whether entries that were 0 have become others.
-    changes: bool,
-    /// The modes that the pivots are for, and pivots that others had.
-    modes: Vec<f64>,
-    kept: Vec<(Vec<f64>, Factors)>,
-}
-
-/// Pivots are kept for so many sets of modes.
-const MOST_KEPT: usize = 8;
-
-impl Matrix {
-    fn new(plan: &MatrixPlan) -> Matrix {
-        Matrix {
-            values: vec![0.0; plan.pattern.len()],
-            factors: None,
-            changes: false,
-            modes: vec![],
-            kept: vec![],
-        }
-    }
-
-    /// Puts the pivots away for when these modes come back, and takes those that the new ones had.
-    fn change_modes(&mut self, modes: &[f64]) {
-        if let Some(factors) = self.factors.take() {
-            if self.kept.len() >= MOST_KEPT {
-                self.kept.remove(0);
-            }
-            self.kept.push((std::mem::take(&mut self.modes), factors));
-        }
-        if let Some(known) = self.kept.iter().position(|(known, _)| known == modes) {
-            let (known, factors) = self.kept.remove(known);
-            (self.modes, self.factors) = (known, Some(factors));
-        } else {
-            self.modes.clear();
-            self.modes.extend_from_slice(modes);
-        }
-    }
-
-    fn forget(&mut self) {
-        self.factors = None;
-        self.kept.clear();
-    }
-
-    /// The first pivots are for the modes that the run begins with.
-    fn begin(&mut self, modes: &[f64]) {
-        if self.modes.is_empty() {
-            self.modes.extend_from_slice(modes);
-        }
-    }
-
-    /// Replays the chosen pivots; chooses new ones where the guard objects.
-    fn factorise(
-        &mut self,
-        plan: &MatrixPlan,
-        orders: &mut Orders,
-        statistics: &mut Statistics,
-    ) -> Result<(), Singular> {
-        if let Some(factors) = &mut self.factors {
-            statistics.refactorisations += 1;
-            match factors.refactor(&self.values) {
-                Ok(()) => {
-                    statistics.symmetric += u64::from(factors.is_symmetric());
-                    return Ok(());
-                }
-                Err(unfit) => self.changes |= unfit == Unfit::Entry,
-            }
-        }
-        statistics.factorisations += 1;
-        self.factors = None;
-        let factors = Factors::new(&plan.pattern, &self.values, self.changes, orders)?;
-        statistics.symmetric += u64::from(factors.is_symmetric());
-        self.factors = Some(factors);
-        Ok(())
-    }
-
-    /// Solves in place.
-    fn solve(&mut self, statistics: &mut Statistics, vector: &mut [f64]) {
-        statistics.solves += 1;
-        if let Some(factors) = &mut self.factors {
-            factors.solve(vector);
-        }
-    }
-}
 
 /// Values of one group of laws.
 #[derive(Debug)]
@@ -116,6 +28,8 @@ struct GroupState {
     /// are those of the present modes.
     constants: Vec<f64>,
     known: bool,
+    /// The unknowns, while these are worked out.
+    moved: Vec<f64>,
 }
 
 impl GroupState {
@@ -124,11 +38,12 @@ impl GroupState {
         if !self.known {
             self.known = true;
             let places = 0..laws.partials();
-            let moved: Vec<f64> =
-                places.clone().map(|p| std::mem::take(&mut inputs[laws.input(p)])).collect();
+            for (p, moved) in places.clone().zip(&mut self.moved) {
+                *moved = std::mem::take(&mut inputs[laws.input(p)]);
+            }
             laws.full(inputs, &mut self.registers, &mut self.constants, &mut self.partials);
             // One that stands there twice is 0 the second time.
-            places.rev().zip(moved.iter().rev()).for_each(|(p, x)| inputs[laws.input(p)] = *x);
+            places.rev().zip(self.moved.iter().rev()).for_each(|(p, x)| inputs[laws.input(p)] = *x);
         }
         for (o, (value, constant)) in self.values.iter_mut().zip(&self.constants).enumerate() {
             let terms = laws.row(o).map(|p| self.partials[p] * inputs[laws.input(p)]);
@@ -195,6 +110,7 @@ impl<'a> Network<'a> {
                 factored: 0.0,
                 constants: vec![0.0; if group.modal { group.targets.len() } else { 0 }],
                 known: false,
+                moved: vec![0.0; if group.modal { group.laws.partials() } else { 0 }],
             })
             .collect();
         Network {
@@ -544,7 +460,7 @@ impl<'a> Network<'a> {
 
     /// Whether the factors at hand are of use for another step of the same length, and dear to make.
     pub fn favours_equal_steps(&self) -> bool {
-        self.system.is_linear() && self.dynamic.factors.as_ref().is_some_and(Factors::is_symmetric)
+        self.system.is_linear() && self.dynamic.is_symmetric()
     }
 
     /// Whether the factors at hand are those of about the same α.
@@ -830,33 +746,4 @@ fn slopes(laws: &LawSet, inputs: &[f64]) -> (Vec<f64>, Vec<f64>) {
 
 fn device_of(group: &LawGroup, o: usize) -> Option<crate::circuit::DeviceId> {
     group.devices.get(o).copied()
-}
-
-fn voltage_across(junction: &Junction, x: impl Fn(usize) -> f64) -> f64 {
-    let [anode, cathode] = junction.across.map(|u| u.map_or(0.0, |k| x(k.0 as usize)));
-    anode - cathode
-}
-
-/// Whether a junction's conductance is about the same at these voltages.
-fn rests(junction: &Junction, voltages: &[f64]) -> bool {
-    /// In units of n·Vt.
-    const MOVED: f64 = 0.3;
-    let [least, most] = junction.off;
-    let low = voltages.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = voltages.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    high - low <= MOVED * junction.thermal || (low >= least && high <= most)
-}
-
-/// Limits the change of a junction's voltage (L. W. Nagel, SPICE2, ERL-M520, 1975, section 4.2): above the critical
-/// voltage the *current* may change in proportion to the step, so the voltage by its logarithm.
-fn limit_junction(new: f64, old: f64, thermal: f64, critical: f64) -> f64 {
-    if new <= critical || (new - old).abs() <= 2.0 * thermal {
-        return new;
-    }
-    if old > 0.0 {
-        let argument = 1.0 + (new - old) / thermal;
-        if argument > 0.0 { old + thermal * libm::log(argument) } else { critical }
-    } else {
-        thermal * libm::log(new / thermal)
-    }
 }
