@@ -163,7 +163,10 @@ impl Inside {
             let lands = self.reached.t + h >= end;
             self.shorter.copy_from(&self.point);
             self.shorter.t = if lands { end } else { self.reached.t + h };
-            let error = trbdf2::step(network, &self.reached, &mut self.shorter, weights, work);
+            let (from, to) = (&self.reached, &mut self.shorter);
+            let error = beside(network, work, |network, work| {
+                trbdf2::step(network, from, to, weights, work)
+            });
             let error = error.unwrap_or(f64::INFINITY);
             if error <= 1.0 {
                 std::mem::swap(&mut self.reached, &mut self.shorter);
@@ -202,7 +205,9 @@ impl Inside {
             line(&mut self.point.w, &from.w, &to.w);
             return Ok(());
         }
-        match trbdf2::step(network, from, &mut self.point, weights, work) {
+        let to = &mut self.point;
+        match beside(network, work, |network, work| trbdf2::step(network, from, to, weights, work))
+        {
             Ok(_) => Ok(()),
             Err(cut) => Err(Stopped::Values(time, cut)),
         }
@@ -283,6 +288,21 @@ impl Inside {
     }
 }
 
+/// Takes a step beside the run's own, which go on as if it had not been taken.
+fn beside<T>(
+    network: &mut Network,
+    work: &mut Work,
+    step: impl FnOnce(&mut Network, &mut Work) -> T,
+) -> T {
+    let known = work.scratch.convergence();
+    work.scratch.near.forget();
+    network.turn_aside();
+    let outcome = step(network, work);
+    network.turn_aside();
+    work.scratch.go_on_with(known);
+    outcome
+}
+
 /// Whether parabolas of the unknowns asked for miss the equations between the ends of a step by more than the step may
 /// err: a diode that begins or ends to conduct bends the solution there, and only the values at the stages are tested.
 fn is_rough(
@@ -300,11 +320,7 @@ fn is_rough(
     if !work.dense.by_unknowns {
         return false;
     }
-    let within = |theta: f64| {
-        let dense = &work.dense;
-        move |k: usize| dense.unknown(k, theta, from, to)
-    };
-    if network.rests_at([0.0, 0.5, 1.0].map(within)) {
+    if network.rests_within(&work.dense, from, to) {
         return false;
     }
     let h = to.t - from.t;

@@ -22,7 +22,7 @@ const TWICE: u32 = 4;
 const CHEAPER: u32 = 16;
 
 /// What is known of iterations with the factors at hand.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
     /// ρ; infinite where it is not known.
     rate: f64,

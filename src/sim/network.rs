@@ -7,6 +7,8 @@ use super::junctions::{limit_junction, rests, voltage_across};
 use super::laws::{LawSet, Registers};
 use super::matrix::Matrix;
 use super::memory::Memories;
+use super::methods::Dense;
+use super::op::State;
 use super::statistics::Statistics;
 use super::system::{LawGroup, System, Target};
 use crate::circuit::waveform::Segment;
@@ -52,6 +54,15 @@ impl GroupState {
     }
 }
 
+/// Factors of steps that are taken beside the run's own, for rows: these must not change what a run does.
+#[derive(Debug)]
+struct Aside {
+    dynamic: Matrix,
+    factored_alpha: Option<f64>,
+    stage_alpha: Option<f64>,
+    factored: Vec<f64>,
+}
+
 /// A system with modes, segments of its sources, and room to compute in.
 #[derive(Debug)]
 pub(crate) struct Network<'a> {
@@ -86,6 +97,7 @@ pub(crate) struct Network<'a> {
     factored_alpha: Option<f64>,
     /// α of the factors at hand, whatever else they depend on.
     stage_alpha: Option<f64>,
+    aside: Aside,
     /// The charges held in the factorised frozen matrix, where it depends on nothing else; empty where it does.
     factored_held: Vec<bool>,
 }
@@ -134,6 +146,12 @@ impl<'a> Network<'a> {
             orders: Orders::default(),
             factored_alpha: None,
             stage_alpha: None,
+            aside: Aside {
+                dynamic: Matrix::new(&system.dynamic),
+                factored_alpha: None,
+                stage_alpha: None,
+                factored: vec![0.0; system.groups.len()],
+            },
             factored_held: vec![],
         }
     }
@@ -458,6 +476,17 @@ impl<'a> Network<'a> {
         result
     }
 
+    /// Changes between the factors of the run's own steps and those of steps beside them.
+    pub fn turn_aside(&mut self) {
+        let Aside { dynamic, factored_alpha, stage_alpha, factored } = &mut self.aside;
+        std::mem::swap(&mut self.dynamic, dynamic);
+        std::mem::swap(&mut self.factored_alpha, factored_alpha);
+        std::mem::swap(&mut self.stage_alpha, stage_alpha);
+        for (state, factored) in self.groups.iter_mut().zip(factored) {
+            std::mem::swap(&mut state.factored, factored);
+        }
+    }
+
     /// Whether the factors at hand are of use for another step of the same length, and dear to make.
     pub fn favours_equal_steps(&self) -> bool {
         self.system.is_linear() && self.dynamic.is_symmetric()
@@ -483,11 +512,12 @@ impl<'a> Network<'a> {
         self.system.has_junctions_alone() && self.junctions_rest(x)
     }
 
-    /// Whether all is linear but junctions, and they rest at all these points.
-    pub fn rests_at<const N: usize>(&self, points: [impl Fn(usize) -> f64; N]) -> bool {
+    /// Whether all is linear but junctions, and they rest at the ends of a step and in its middle.
+    pub fn rests_within(&self, dense: &Dense, from: &State, to: &State) -> bool {
+        let at = |theta: f64| move |k: usize| dense.unknown(k, theta, from, to);
         self.system.has_junctions_alone()
             && self.system.groups.iter().filter_map(|group| group.junction).all(|junction| {
-                rests(&junction, &points.each_ref().map(|x| voltage_across(&junction, x)))
+                rests(&junction, &[0.0, 0.5, 1.0].map(|theta| voltage_across(&junction, at(theta))))
             })
     }
 
@@ -571,6 +601,7 @@ impl<'a> Network<'a> {
     pub fn forget_pivots(&mut self) {
         self.frozen.forget();
         self.dynamic.forget();
+        self.aside.dynamic.forget();
         self.forget_constant_factors();
     }
 
@@ -578,6 +609,7 @@ impl<'a> Network<'a> {
     pub fn change_pivots(&mut self) {
         self.frozen.change_modes(&self.modes);
         self.dynamic.change_modes(&self.modes);
+        self.aside.dynamic.change_modes(&self.modes);
         self.forget_constant_factors();
     }
 
@@ -592,6 +624,7 @@ impl<'a> Network<'a> {
         self.factored_alpha = None;
         self.stage_alpha = None;
         self.factored_held.clear();
+        (self.aside.factored_alpha, self.aside.stage_alpha) = (None, None);
     }
 
     /// Guards of the modes, two values each.

@@ -54,6 +54,16 @@ impl Scratch {
         }
     }
 
+    /// What is known of how iterations converge, for steps that are taken beside the run's own.
+    pub fn convergence(&self) -> (f64, u32, Near) {
+        (self.bend, self.age, self.near)
+    }
+
+    /// Goes on with what was known before such steps.
+    pub fn go_on_with(&mut self, (bend, age, near): (f64, u32, Near)) {
+        (self.bend, self.age, self.near) = (bend, age, near);
+    }
+
     /// What was measured of the equations no longer holds.
     pub fn forget_bend(&mut self) {
         self.bend = f64::INFINITY;

@@ -215,16 +215,15 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
-        // Whether columns are straight is read off parabolas of the unknowns, where steps are short enough for them; only
-        // what is written is solved for. Within the long steps of methods of higher order what follows a source moves in
-        // ways that their polynomials do not say, unless that is straight and all is linear.
-        let parabolas = !index2
+        // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
+        // only what is written is solved for. Within the long steps of methods of higher order what follows a source
+        // moves in ways that their polynomials do not say, unless that is straight and all is linear; nor does the past say
+        // that a diode begins to conduct.
+        let by_past = work.dense.by_past
             && !network.system.output_rates
-            && (work.dense.by_past
-                || work.dense.by_unknowns
-                    && !self.inside.is_rough(network, from, to, weights, work));
-        let smooth = parabolas || (!index2 && network.is_straight());
-        let parabolic = parabolas && network.system.law_columns.is_empty();
+            && (!network.system.has_junctions() || network.rests_within(&work.dense, from, to));
+        let smooth = !index2 && (by_past || network.is_straight());
+        let parabolic = by_past && network.system.law_columns.is_empty();
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;

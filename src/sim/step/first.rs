@@ -32,17 +32,10 @@ impl Kind {
     }
 }
 
-/// The step that did, and whether longer ones had failed.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    h: f64,
-    failed: bool,
-}
-
-/// Kinds of corners and events, each with the step that did after it.
+/// Kinds of corners and events, each with the step that did after it where longer ones had failed.
 #[derive(Debug, Default)]
 pub(super) struct First {
-    known: Vec<(Kind, Option<Known>)>,
+    known: Vec<(Kind, Option<f64>)>,
     /// The next to be forgotten.
     oldest: usize,
     /// That of the last corner or event.
@@ -87,23 +80,20 @@ impl First {
 }
 
 impl Run<'_> {
-    /// A careful first step after a corner or event, or one that its last of the kind says would do.
+    /// A careful first step after a corner or event, and no longer than what did after the last one of its kind, where longer
+    /// ones had failed.
     pub(super) fn shorten(&mut self) {
         let span = self.distance();
         let careful = 0.1 * span;
         let known = self.first.present.and_then(|place| self.first.known[place].1);
-        let most = match known {
-            Some(Known { h, failed: true }) => h,
-            Some(Known { h, .. }) => h.max(careful),
-            None => careful,
-        };
+        let most = known.map_or(careful, |did| did.min(careful));
         self.h = (0.5 * self.h).min(most).max(self.smallest);
     }
 
     /// The first step after a corner or event says how long the next one of its kind may be.
     pub(super) fn learn_first(&mut self, h: f64, failed: bool) {
         if let Some(place) = self.first.present.take() {
-            self.first.known[place].1 = Some(Known { h, failed });
+            self.first.known[place].1 = failed.then_some(h);
         }
     }
 }

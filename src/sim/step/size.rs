@@ -24,7 +24,9 @@ impl Run<'_> {
     pub(super) fn before_wall(&self, h: f64) -> f64 {
         let way = self.wall - self.state.t;
         match self.last {
-            Some((_, last)) if way > 0.0 => h.min((0.5 * way).max(last)),
+            Some((_, last)) if way > 0.0 && self.method.error_power() <= 3.0 => {
+                h.min((0.5 * way).max(last))
+            }
             _ => h,
         }
     }
