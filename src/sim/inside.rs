@@ -103,7 +103,9 @@ impl Inside {
             return self.shorter_step(network, from, to, time, weights, work);
         }
         if !index2 && network.is_straight() {
-            work.dense.unknowns(theta, from, to, &mut self.point.x);
+            for (k, x) in self.point.x.iter_mut().enumerate() {
+                *x = work.dense.unknown(k, theta, from, to);
+            }
             self.point.t = time;
             return Ok(());
         }

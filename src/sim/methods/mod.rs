@@ -168,6 +168,10 @@ impl Dense {
     pub fn unknown(&self, i: usize, theta: f64, from: &State, to: &State) -> f64 {
         let rest = 1.0 - theta;
         let inner = self.x[0][i] + theta * (self.x[1][i] + theta * self.x[2][i]);
+        if inner == 0.0 && from.x[i] == to.x[i] {
+            // What rests does so to the last digit.
+            return to.x[i];
+        }
         rest * from.x[i] + theta * (to.x[i] + rest * inner)
     }
 
