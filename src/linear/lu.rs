@@ -331,18 +331,24 @@ impl<T: Field> Lu<T> {
         }
     }
 
-    /// The elimination with these values. Unguarded, it sets the guards for later ones.
-    fn replay(&mut self, values: &[T], guarded: bool) -> Result<(), Trouble> {
+    /// Puts the scaled values in their places. Gives the largest magnitude, as bits.
+    fn load(&mut self, values: &[T]) -> u64 {
         self.factors.fill(T::ZERO);
-        let mut before = 0;
+        let mut largest = 0;
         for ((&at, &by), &value) in self.place.iter().zip(&self.scale).zip(values) {
             let value = value.scaled(by);
-            before = before.max(bits(value));
+            largest = largest.max(bits(value));
             self.factors[at as usize] = value;
         }
         for (loaded, &at) in self.loaded.iter_mut().zip(&self.diagonal) {
             *loaded = bits(self.factors[at as usize]);
         }
+        largest
+    }
+
+    /// The elimination with these values. Unguarded, it sets the guards for later ones.
+    fn replay(&mut self, values: &[T], guarded: bool) -> Result<(), Trouble> {
+        let before = self.load(values);
         let mut after = before;
         for k in 0..self.n {
             if self.program_starts.is_empty() {
@@ -374,18 +380,11 @@ impl<T: Field> Lu<T> {
     /// The same for small matrices, judged at its end as a whole. Says whether all is well; if not, the careful way says
     /// why.
     fn replay_quickly(&mut self, values: &[T]) -> bool {
-        let Lu { flat, factors, inverse, .. } = self;
-        let Some(flat) = flat.as_mut().filter(|_| !T::EXACT) else { return false };
-        factors.fill(T::ZERO);
-        let mut before: f64 = 0.0;
-        for ((&at, &by), &value) in self.place.iter().zip(&self.scale).zip(values) {
-            let value = value.scaled(by);
-            before = before.max(value.magnitude());
-            factors[at as usize] = value;
+        if T::EXACT || self.flat.is_none() {
+            return false;
         }
-        for (loaded, &at) in self.loaded.iter_mut().zip(&self.diagonal) {
-            *loaded = bits(factors[at as usize]);
-        }
+        let before = f64::from_bits(self.load(values));
+        let Lu { flat: Some(flat), factors, inverse, .. } = self else { return false };
         let parts = self.program_starts.windows(2).zip(&self.starts[1..]);
         let pivots = self.diagonal.iter().zip(inverse.iter_mut());
         for ((&at, inverse), (part, &end)) in pivots.zip(parts) {

@@ -2,7 +2,7 @@
 
 use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
-use super::laws::{self, Group, LawSet, Placed};
+use super::laws::{Group, LawSet, Placed};
 use super::memory::MemoryData;
 use super::plans::{self, Plans};
 use super::reduce;
@@ -166,20 +166,20 @@ impl<'a> Builder<'a> {
     fn place_laws(&mut self) {
         let stamps = self.stamps;
         let n = self.unknowns.len() as u32;
-        let mut plain: Group = (Dag::default(), vec![], None);
+        let mut plain = Group::default();
         let mut junctions: BTreeMap<u32, Group> = BTreeMap::new();
         for stamp in &stamps.laws {
             if let Some(junction) = stamp.junction {
                 junctions
                     .entry(stamp.device.0)
-                    .or_insert_with(|| (Dag::default(), vec![], Some(junction)));
+                    .or_insert_with(|| Group { junction: Some(junction), ..Group::default() });
             }
         }
         for stamp in &stamps.laws {
             let into: Vec<(u32, f64)> = stamp.into.iter().map(|(row, f)| (row.0, *f)).collect();
             let group = junctions.get_mut(&stamp.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.0, &stamp.law, stamp.device);
-            match group.0.affine(node) {
+            let node = self.add(&mut group.dag, &stamp.law, stamp.device);
+            match group.dag.affine(node) {
                 Some((constant, factors)) if factors.iter().all(|(input, _)| *input < n) => {
                     for (row, factor) in into {
                         if constant != 0.0 {
@@ -190,7 +190,7 @@ impl<'a> Builder<'a> {
                         }
                     }
                 }
-                _ => group.1.push(Placed {
+                _ => group.laws.push(Placed {
                     node,
                     target: Target::Equations(into),
                     device: stamp.device,
@@ -200,8 +200,8 @@ impl<'a> Builder<'a> {
         for (k, charge) in stamps.charges.iter().enumerate() {
             let Some(law) = &charge.law else { continue };
             let group = junctions.get_mut(&charge.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.0, law, charge.device);
-            match group.0.affine(node) {
+            let node = self.add(&mut group.dag, law, charge.device);
+            match group.dag.affine(node) {
                 // A constant part of a charge has no rate, but it belongs to the initial value: keep such a law.
                 Some((constant, factors))
                     if constant == 0.0 && factors.iter().all(|(input, _)| *input < n) =>
@@ -213,15 +213,14 @@ impl<'a> Builder<'a> {
                 _ => {
                     self.curved[k] = true;
                     let target = Target::Charge(k as u32);
-                    group.1.push(Placed { node, target, device: charge.device });
+                    group.laws.push(Placed { node, target, device: charge.device });
                 }
             }
         }
-        let (modal, plain) = laws::part_modal(plain, self.time_input());
-        self.groups.push(modal);
+        self.groups.push(plain.part_modal(self.time_input()));
         self.groups.push(plain);
         self.groups.extend(junctions.into_values());
-        self.groups.retain(|(_, laws, _)| !laws.is_empty());
+        self.groups.retain(|group| !group.laws.is_empty());
     }
 
     /// Makes the rates of dependent charges unknowns of their own, until no constraint is left that can be used.
@@ -293,7 +292,7 @@ impl<'a> Builder<'a> {
         for (row, _) in self.stamps.memories.iter().flat_map(|memory| &memory.into) {
             constant[row.0 as usize] = None;
         }
-        let laws = self.groups.iter().flat_map(|(_, laws, _)| laws);
+        let laws = self.groups.iter().flat_map(|group| &group.laws);
         for law in laws {
             if let Target::Equations(into) = &law.target {
                 into.iter().for_each(|(row, _)| constant[*row as usize] = None);
@@ -308,9 +307,9 @@ impl<'a> Builder<'a> {
         let time = self.time_input();
         let charges = stamps.charges.len();
         let mut groups: Vec<LawGroup> = vec![];
-        for (mut dag, laws, junction) in std::mem::take(&mut self.groups) {
+        for group in std::mem::take(&mut self.groups) {
+            let Group { mut dag, laws, junction, modal } = group;
             let nodes: Vec<NodeId> = laws.iter().map(|law| law.node).collect();
-            let modal = junction.is_none() && laws.iter().all(|law| law.is_modal(&dag, time));
             groups.push(LawGroup {
                 modal,
                 laws: LawSet::new(&mut dag, &nodes, time as u32 + 1),

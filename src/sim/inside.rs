@@ -72,19 +72,6 @@ impl Inside {
         self.reached.t = f64::NAN;
     }
 
-    /// Whether what is interpolated in this step is too far from the equations.
-    pub fn is_rough(
-        &mut self,
-        network: &mut Network,
-        from: &State,
-        to: &State,
-        weights: &[f64],
-        work: &mut Work,
-    ) -> bool {
-        let asked = &self.asked;
-        *self.rough.get_or_insert_with(|| is_rough(network, from, to, asked, weights, work))
-    }
-
     /// Puts the values at a time inside a step into `self.point`.
     #[allow(clippy::too_many_arguments)]
     pub fn between(
@@ -109,7 +96,9 @@ impl Inside {
             self.point.t = time;
             return Ok(());
         }
-        let rough = self.is_rough(network, from, to, weights, work);
+        let asked = &self.asked;
+        let rough =
+            *self.rough.get_or_insert_with(|| is_rough(network, from, to, asked, weights, work));
         work.dense.unknowns(theta, from, to, &mut self.point.x);
         if work.dense.by_unknowns {
             network.evaluate(&self.point.x, time);
@@ -319,10 +308,7 @@ fn is_rough(
     const ASKED: [f64; 2] = [0.3, 0.8];
     /// In units of what a step may err by.
     const MOST: f64 = 2.0;
-    if !work.dense.by_unknowns {
-        return false;
-    }
-    if network.rests_within(&work.dense, from, to) {
+    if !work.dense.by_unknowns || network.rests_within(&work.dense, from, to) {
         return false;
     }
     let h = to.t - from.t;

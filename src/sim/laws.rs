@@ -14,21 +14,32 @@ pub(crate) struct Placed {
 
 impl Placed {
     /// Whether it is affine in the unknowns, which stand before time, for fixed modes, which stand behind it.
-    pub fn is_modal(&self, dag: &Dag, time: usize) -> bool {
+    fn is_modal(&self, dag: &Dag, time: usize) -> bool {
         matches!(self.target, Target::Equations(_))
             && dag.is_affine_while(self.node, time as u32, time as u32 + 1)
     }
 }
 
 /// A group on its way into a system.
-pub(crate) type Group = (Dag, Vec<Placed>, Option<Junction>);
+#[derive(Default)]
+pub(crate) struct Group {
+    pub dag: Dag,
+    pub laws: Vec<Placed>,
+    pub junction: Option<Junction>,
+    /// Whether all its laws are affine for fixed modes.
+    pub modal: bool,
+}
 
-/// Takes out of a group the laws that are affine for fixed modes.
-pub(crate) fn part_modal((dag, laws, junction): Group, time: usize) -> (Group, Group) {
-    let (modal, curved): (Vec<_>, Vec<_>) =
-        laws.into_iter().partition(|law| law.is_modal(&dag, time));
-    let own = if modal.is_empty() { Dag::default() } else { dag.clone() };
-    ((own, modal, None), (dag, curved, junction))
+impl Group {
+    /// Takes out the laws that are affine for fixed modes.
+    pub fn part_modal(&mut self, time: usize) -> Group {
+        let laws = std::mem::take(&mut self.laws);
+        let (modal, curved): (Vec<_>, Vec<_>) =
+            laws.into_iter().partition(|law| law.is_modal(&self.dag, time));
+        self.laws = curved;
+        let dag = if modal.is_empty() { Dag::default() } else { self.dag.clone() };
+        Group { dag, laws: modal, junction: None, modal: true }
+    }
 }
 
 /// Laws over common inputs.

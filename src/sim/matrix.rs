@@ -5,7 +5,7 @@ use super::system::MatrixPlan;
 use crate::linear::{Factors, Orders, Singular, Unfit};
 
 /// A matrix of fixed pattern with its factors.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Matrix {
     pub values: Vec<f64>,
     factors: Option<Factors>,
@@ -20,16 +20,6 @@ pub(crate) struct Matrix {
 const MOST_KEPT: usize = 8;
 
 impl Matrix {
-    pub fn new(plan: &MatrixPlan) -> Matrix {
-        Matrix {
-            values: vec![0.0; plan.pattern.len()],
-            factors: None,
-            changes: false,
-            modes: vec![],
-            kept: vec![],
-        }
-    }
-
     /// Puts the pivots away for when these modes come back, and takes those that the new ones had.
     pub fn change_modes(&mut self, modes: &[f64]) {
         if let Some(factors) = self.factors.take() {

@@ -23,9 +23,8 @@ struct GroupState {
     values: Vec<f64>,
     partials: Vec<f64>,
     registers: Registers,
-    /// Junction voltage of the last linearisation, and of the dynamic matrix's factors.
+    /// Junction voltage of the last linearisation.
     voltage: f64,
-    factored: f64,
     /// Of laws that are affine for fixed modes: their values where all unknowns are 0; whether these and the derivatives
     /// are those of the present modes.
     constants: Vec<f64>,
@@ -54,13 +53,26 @@ impl GroupState {
     }
 }
 
-/// Factors of steps that are taken beside the run's own, for rows: these must not change what a run does.
-#[derive(Debug)]
-struct Aside {
-    dynamic: Matrix,
-    factored_alpha: Option<f64>,
-    stage_alpha: Option<f64>,
-    factored: Vec<f64>,
+/// The dynamic matrix of steps, and what its factors depend on.
+#[derive(Debug, Default)]
+struct Stages {
+    matrix: Matrix,
+    /// α of the factors, where they depend on nothing else.
+    constant_alpha: Option<f64>,
+    /// α of the factors, whatever else they depend on.
+    alpha: Option<f64>,
+    /// Junction voltages that they were made at.
+    voltages: Vec<f64>,
+}
+
+impl Stages {
+    fn new(groups: usize) -> Stages {
+        Stages { voltages: vec![0.0; groups], ..Stages::default() }
+    }
+
+    fn forget_alpha(&mut self) {
+        (self.constant_alpha, self.alpha) = (None, None);
+    }
 }
 
 /// A system with modes, segments of its sources, and room to compute in.
@@ -89,15 +101,12 @@ pub(crate) struct Network<'a> {
     control_registers: Registers,
     output_registers: Registers,
     groups: Vec<GroupState>,
-    dynamic: Matrix,
+    /// Of the run's own steps, and of those that are taken beside them for rows, which must not change what a run does.
+    stages: Stages,
+    aside: Stages,
     frozen: Matrix,
     /// Orders of elimination worked out so far.
     pub orders: Orders,
-    /// α of the factorised dynamic matrix, where it depends on nothing else.
-    factored_alpha: Option<f64>,
-    /// α of the factors at hand, whatever else they depend on.
-    stage_alpha: Option<f64>,
-    aside: Aside,
     /// The charges held in the factorised frozen matrix, where it depends on nothing else; empty where it does.
     factored_held: Vec<bool>,
 }
@@ -119,7 +128,6 @@ impl<'a> Network<'a> {
                 partials: vec![0.0; group.laws.partials()],
                 registers: group.laws.registers(),
                 voltage: 0.0,
-                factored: 0.0,
                 constants: vec![0.0; if group.modal { group.targets.len() } else { 0 }],
                 known: false,
                 moved: vec![0.0; if group.modal { group.laws.partials() } else { 0 }],
@@ -141,17 +149,10 @@ impl<'a> Network<'a> {
             control_registers: system.controls.registers(),
             output_registers: system.output_laws.registers(),
             groups,
-            dynamic: Matrix::new(&system.dynamic),
-            frozen: Matrix::new(&system.frozen),
+            stages: Stages::new(system.groups.len()),
+            aside: Stages::new(system.groups.len()),
+            frozen: Matrix::default(),
             orders: Orders::default(),
-            factored_alpha: None,
-            stage_alpha: None,
-            aside: Aside {
-                dynamic: Matrix::new(&system.dynamic),
-                factored_alpha: None,
-                stage_alpha: None,
-                factored: vec![0.0; system.groups.len()],
-            },
             factored_held: vec![],
         }
     }
@@ -448,12 +449,13 @@ impl<'a> Network<'a> {
 
     /// Fills and factorises W(α) with the derivatives of the last linearisation.
     pub fn factorise_dynamic(&mut self, alpha: f64) -> Result<(), Singular> {
-        if self.factored_alpha.is_some_and(|known| (known - alpha).abs() <= SAME_ALPHA * alpha) {
+        let stages = &mut self.stages;
+        if stages.constant_alpha.is_some_and(|known| (known - alpha).abs() <= SAME_ALPHA * alpha) {
             return Ok(());
         }
         let plan = &self.system.dynamic;
-        let values = &mut self.dynamic.values;
-        values.copy_from_slice(&plan.fixed);
+        let values = &mut stages.matrix.values;
+        values.clone_from(&plan.fixed);
         for place in &plan.storage {
             values[place.slot as usize] += alpha * place.factor;
         }
@@ -467,41 +469,37 @@ impl<'a> Network<'a> {
                     alpha * place.factor * state.partials[place.partial as usize];
             }
         }
-        self.groups.iter_mut().for_each(|state| state.factored = state.voltage);
-        self.dynamic.begin(&self.modes);
-        let result = self.dynamic.factorise(plan, &mut self.orders, &mut self.statistics);
+        for (voltage, state) in stages.voltages.iter_mut().zip(&self.groups) {
+            *voltage = state.voltage;
+        }
+        stages.matrix.begin(&self.modes);
+        let result = stages.matrix.factorise(plan, &mut self.orders, &mut self.statistics);
         let constant = result.is_ok() && self.system.is_linear();
-        self.factored_alpha = constant.then_some(alpha);
-        self.stage_alpha = result.is_ok().then_some(alpha);
+        stages.constant_alpha = constant.then_some(alpha);
+        stages.alpha = result.is_ok().then_some(alpha);
         result
     }
 
     /// Changes between the factors of the run's own steps and those of steps beside them.
     pub fn turn_aside(&mut self) {
-        let Aside { dynamic, factored_alpha, stage_alpha, factored } = &mut self.aside;
-        std::mem::swap(&mut self.dynamic, dynamic);
-        std::mem::swap(&mut self.factored_alpha, factored_alpha);
-        std::mem::swap(&mut self.stage_alpha, stage_alpha);
-        for (state, factored) in self.groups.iter_mut().zip(factored) {
-            std::mem::swap(&mut state.factored, factored);
-        }
+        std::mem::swap(&mut self.stages, &mut self.aside);
     }
 
     /// Whether the factors at hand are of use for another step of the same length, and dear to make.
     pub fn favours_equal_steps(&self) -> bool {
-        self.system.is_linear() && self.dynamic.is_symmetric()
+        self.system.is_linear() && self.stages.matrix.is_symmetric()
     }
 
     /// Whether the factors at hand are those of about the same α.
     pub fn factors_serve(&self, alpha: f64) -> bool {
-        self.stage_alpha.is_some_and(|known| (known - alpha).abs() <= ABOUT_SAME * alpha)
+        self.stages.alpha.is_some_and(|known| (known - alpha).abs() <= ABOUT_SAME * alpha)
     }
 
     /// Whether no junction's conductance at `x` is far from what it was when the factors at hand were made.
     pub fn junctions_rest(&self, x: &[f64]) -> bool {
-        self.groups.iter().zip(&self.system.groups).all(|(state, group)| {
+        self.stages.voltages.iter().zip(&self.system.groups).all(|(voltage, group)| {
             group.junction.is_none_or(|junction| {
-                rests(&junction, &[state.factored, voltage_across(&junction, |k| x[k])])
+                rests(&junction, &[*voltage, voltage_across(&junction, |k| x[k])])
             })
         })
     }
@@ -523,7 +521,7 @@ impl<'a> Network<'a> {
 
     /// Solves W·y = y in place.
     pub fn solve_dynamic(&mut self, y: &mut [f64]) {
-        self.dynamic.solve(&mut self.statistics, y);
+        self.stages.matrix.solve(&mut self.statistics, y);
     }
 
     /// Fills and factorises the frozen network. `held` says which charges keep their value; the others have w = 0.
@@ -536,7 +534,7 @@ impl<'a> Network<'a> {
         self.factored_held.clear();
         let plan = &self.system.frozen;
         let values = &mut self.frozen.values;
-        values.copy_from_slice(&plan.fixed);
+        values.clone_from(&plan.fixed);
         for place in &plan.storage {
             if held[place.partial as usize] {
                 values[place.slot as usize] += place.factor;
@@ -599,17 +597,17 @@ impl<'a> Network<'a> {
 
     /// Forgets the pivots chosen: the next matrices differ in structure (charges held, values out of range).
     pub fn forget_pivots(&mut self) {
-        self.frozen.forget();
-        self.dynamic.forget();
-        self.aside.dynamic.forget();
+        for matrix in [&mut self.frozen, &mut self.stages.matrix, &mut self.aside.matrix] {
+            matrix.forget();
+        }
         self.forget_constant_factors();
     }
 
     /// Goes on with other pivots: a switch has changed, and the matrices with it by orders of magnitude.
     pub fn change_pivots(&mut self) {
-        self.frozen.change_modes(&self.modes);
-        self.dynamic.change_modes(&self.modes);
-        self.aside.dynamic.change_modes(&self.modes);
+        for matrix in [&mut self.frozen, &mut self.stages.matrix, &mut self.aside.matrix] {
+            matrix.change_modes(&self.modes);
+        }
         self.forget_constant_factors();
     }
 
@@ -621,10 +619,9 @@ impl<'a> Network<'a> {
 
     /// Forgets that the factors at hand are of the present matrix.
     pub fn forget_constant_factors(&mut self) {
-        self.factored_alpha = None;
-        self.stage_alpha = None;
+        self.stages.forget_alpha();
+        self.aside.forget_alpha();
         self.factored_held.clear();
-        (self.aside.factored_alpha, self.aside.stage_alpha) = (None, None);
     }
 
     /// Guards of the modes, two values each.

@@ -147,7 +147,7 @@ pub(crate) fn solve_stage(
         network.solve_dynamic(residual);
         if linear {
             x.iter_mut().zip(residual.iter()).for_each(|(x, dx)| *x -= dx);
-            if !x.iter().sum::<f64>().is_finite() && x.iter().any(|x| !x.is_finite()) {
+            if x.iter().any(|x| !x.is_finite()) {
                 return Err(Cut::NonFinite { device: None });
             }
             network.charges(x, q);

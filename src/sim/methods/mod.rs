@@ -164,15 +164,13 @@ impl Dense {
         interpolate(theta, &from.x, &to.x, &self.x, out);
     }
 
-    /// One unknown at a part of the step.
+    /// One unknown at a part of the step; what rests does so to the last digit.
     pub fn unknown(&self, i: usize, theta: f64, from: &State, to: &State) -> f64 {
-        let rest = 1.0 - theta;
-        let inner = self.x[0][i] + theta * (self.x[1][i] + theta * self.x[2][i]);
-        if inner == 0.0 && from.x[i] == to.x[i] {
-            // What rests does so to the last digit.
-            return to.x[i];
+        let k = [self.x[0][i], self.x[1][i], self.x[2][i]];
+        match from.x[i] == to.x[i] && k == [0.0; 3] {
+            true => to.x[i],
+            false => between(theta, from.x[i], to.x[i], k),
         }
-        rest * from.x[i] + theta * (to.x[i] + rest * inner)
     }
 
     /// The charges at a part of the step.
@@ -182,11 +180,14 @@ impl Dense {
 }
 
 fn interpolate(theta: f64, from: &[f64], to: &[f64], k: &[Vec<f64>; 3], out: &mut [f64]) {
-    let rest = 1.0 - theta;
     for (i, out) in out.iter_mut().enumerate() {
-        let inner = k[0][i] + theta * (k[1][i] + theta * k[2][i]);
-        *out = rest * from[i] + theta * (to[i] + rest * inner);
+        *out = between(theta, from[i], to[i], [k[0][i], k[1][i], k[2][i]]);
     }
+}
+
+fn between(theta: f64, from: f64, to: f64, k: [f64; 3]) -> f64 {
+    let rest = 1.0 - theta;
+    rest * from + theta * (to + rest * (k[0] + theta * (k[1] + theta * k[2])))
 }
 
 /// What a step may use of the past, and room to work in.
