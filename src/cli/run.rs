@@ -170,7 +170,7 @@ pub fn ready(
         d.push(Diagnostic::error("E0806", Span::NONE, message).help(format!("add `{card}`")));
         return None;
     };
-    let system = sim::compile(&stamps, d)?;
+    let system = compiled(&analysis, &stamps, d)?;
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
     let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
@@ -223,6 +223,14 @@ pub fn ready(
         native,
         deck: None,
     })
+}
+
+/// A circuit compiled for an analysis.
+fn compiled(analysis: &Analysis, stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
+    match analysis {
+        Analysis::Transient { .. } => sim::compile_for_run(stamps, d),
+        _ => sim::compile(stamps, d),
+    }
 }
 
 /// Analyses that could be run; the one that sensitivities go along with is none of its own.
@@ -317,8 +325,9 @@ impl Run {
         let circuit = self.vary(step, pairs).map_err(input)?;
         let mut d = vec![];
         let stamps = stamps::stamp(&circuit, &mut d);
-        let made =
-            stamps.and_then(|stamps| sim::compile(&stamps, &mut d).map(|system| (stamps, system)));
+        let made = stamps.and_then(|stamps| {
+            compiled(&self.analysis, &stamps, &mut d).map(|system| (stamps, system))
+        });
         let Some((stamps, system)) = made else { return Err(input(d)) };
         if stamps.outputs.len() != self.stamps.outputs.len() {
             let message = "this step has other columns than the first";

@@ -106,7 +106,7 @@ pub const ANALYSES: &[Row] = &[
         columns: |_, _, stamps| {
             [("time".to_string(), "s")].into_iter().chain(outputs(stamps)).collect()
         },
-        run: |job, sink| step::transient(job.system, job.settings, sink),
+        run: |job, sink| super::condense::run(job.stamps, job.system, job.settings, sink),
     },
 ];
 

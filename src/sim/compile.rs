@@ -1,5 +1,6 @@
 //! Stamps → System: affine laws become static stamps, the rest one program; patterns and places are worked out once.
 
+use super::condense::condense;
 use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
 use super::laws::{Group, LawSet, Placed};
@@ -20,6 +21,20 @@ use std::collections::BTreeMap;
 /// node, a loop of voltage sources.
 pub fn compile(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
     compile_for(stamps, false, d)
+}
+
+/// Compiles a circuit's stamps for a run over time: what follows from other unknowns by an equation of its own is no
+/// unknown then. What an error is about is looked for in the whole circuit.
+pub fn compile_for_run(stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
+    let mut own = vec![];
+    let small = condense(stamps).and_then(|condensed| compile(&condensed, &mut own));
+    match small {
+        Some(system) => {
+            d.extend(own);
+            Some(System { condensed: true, ..system })
+        }
+        None => compile(stamps, d),
+    }
 }
 
 /// Compiles a circuit's stamps for linearising: every charge stays an entity of its own, since sources that do not move
@@ -394,6 +409,7 @@ impl<'a> Builder<'a> {
             })
             .collect();
         System {
+            condensed: false,
             time_input: time,
             nodes: stamps.nodes,
             outputs: columns.iter().map(|(name, _)| name.clone()).collect(),

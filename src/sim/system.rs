@@ -120,6 +120,8 @@ pub struct System {
     pub unknowns: Vec<Unknown>,
     /// Number of node voltages.
     pub nodes: usize,
+    /// Whether unknowns that follow from others are left out.
+    pub condensed: bool,
     /// Output columns.
     pub outputs: Vec<Arc<str>>,
     /// So many of them, the last ones, are measured and not written.

@@ -56,13 +56,13 @@ pub fn verify_netlist(
 pub fn circuit_route(netlist: &Netlist, reltol: f64, d: &mut Vec<Diagnostic>) -> Option<Trace> {
     let circuit = flatten::flatten(netlist, d)?;
     let stamps = stamp(&circuit, d)?;
-    let system = sim::compile(&stamps, d)?;
+    let system = sim::compile_for_run(&stamps, d)?;
     let mut settings = sim::Settings::of(&circuit, true, d)?;
     settings.reltol = reltol;
     let names = std::iter::once("time".to_string());
     let names = names.chain(stamps.outputs.iter().map(|output| output.0.to_string())).collect();
     let mut trace = Trace::new(names, vec![]);
-    match sim::transient(&system, &settings, &mut trace) {
+    match sim::run(&stamps, &system, &settings, &mut trace) {
         Ok(statistics) => {
             d.extend(statistics.warnings);
             Some(trace)

@@ -390,8 +390,9 @@ fn netlists_read_back_give_the_run_of_their_model() {
             .unwrap_or_else(|diagnostics| panic!("{model}: {diagnostics:#?}"));
         let trace = run(&model, &Overrides::default());
         back.units.clone_from(&trace.units);
-        // Subcircuits put devices into another order, and steps may end elsewhere: within the run's own tolerance.
-        let tolerance = if text.contains(".subckt") { 1e-6 } else { 1e-12 };
+        // Subcircuits put devices into another order, and steps may end elsewhere: each run errs by what its tolerance of
+        // 1e-6 for a step comes to over all of them, up to 1.3e-6 (against runs at 1e-9).
+        let tolerance = if text.contains(".subckt") { 3e-6 } else { 1e-12 };
         agree(&model, &back, &trace, tolerance);
     }
 }

@@ -99,7 +99,8 @@ fn the_error_is_that_of_two_runs() {
     let flat = ["--until", "0.12s", "-q", "--observe", "x in mm, f(jack_moving)"];
     bondspice(&[&["simulate", &less, "-o", &b], &flat[..]].concat());
     let (error, again) = (reduced["errors"]["x"].as_f64().unwrap(), measured(&a, &b, "x"));
-    assert!(error > 0.0 && (error - again).abs() <= 1e-9 * again, "{error} {again}");
+    // The text read back has its devices in another order, and steps of a tolerance of 1e-6 end elsewhere.
+    assert!(error > 0.0 && (error - again).abs() <= 1e-6 * again, "{error} {again}");
     // The text is a model with as many elements fewer.
     let graph = bondspice(&["simulate", &less, "--emit", "graph"]);
     assert!(!graph.contains("jack_M") && graph.contains("jack_moving"), "{graph}");
