@@ -6,7 +6,8 @@
 //!
 //! A method of order 2 misses by E·x''' with a factor of its own, so that what it makes of a step differs from the
 //! prediction by (P + E)·x''', and its error is E/(P + E) times that difference (W. E. Milne's device; E. Hairer,
-//! S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.7).
+//! S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, III.7). Iterations begin where the next
+//! step would end if it led away as the last one did.
 
 use crate::sim::op::State;
 
@@ -16,6 +17,9 @@ pub(crate) struct History {
     times: [f64; 2],
     x: [Vec<f64>; 2],
     count: usize,
+    /// (P + E)·x'''/P of the last step, and whether there is one.
+    away: Vec<f64>,
+    has_away: bool,
     /// Charges and rates at the latest.
     pub q: Vec<f64>,
     pub w: Vec<f64>,
@@ -27,6 +31,8 @@ impl History {
             times: [0.0; 2],
             x: [vec![0.0; n], vec![0.0; n]],
             count: 0,
+            away: vec![0.0; n],
+            has_away: false,
             q: vec![0.0; charges],
             w: vec![0.0; charges],
         }
@@ -35,6 +41,7 @@ impl History {
     /// Nothing of the past tells of what is to come.
     pub fn forget(&mut self) {
         self.count = 0;
+        self.has_away = false;
     }
 
     /// Takes the left end of an accepted step.
@@ -80,6 +87,23 @@ impl History {
                 }
                 Some((h + last) * (h + last + first) / (6.0 * h * h))
             }
+        }
+    }
+
+    /// Moves a parabola's prediction, which misses by P = `missed`·h³, to where steps have led of late.
+    pub fn lead(&self, missed: f64, h: f64, x: &mut [f64]) {
+        if self.has_away {
+            let part = missed * h * h * h;
+            x.iter_mut().zip(&self.away).for_each(|(x, away)| *x += part * away);
+        }
+    }
+
+    /// Learns where a step led from what was predicted.
+    pub fn learn(&mut self, missed: f64, h: f64, predicted: &[f64], reached: &[f64]) {
+        let part = 1.0 / (missed * h * h * h);
+        self.has_away = part.is_finite();
+        for ((away, reached), predicted) in self.away.iter_mut().zip(reached).zip(predicted) {
+            *away = part * (reached - predicted);
         }
     }
 

@@ -166,11 +166,12 @@ impl Dense {
 
     /// One unknown at a part of the step; what rests does so to the last digit.
     pub fn unknown(&self, i: usize, theta: f64, from: &State, to: &State) -> f64 {
-        let k = [self.x[0][i], self.x[1][i], self.x[2][i]];
-        match from.x[i] == to.x[i] && k == [0.0; 3] {
-            true => to.x[i],
-            false => between(theta, from.x[i], to.x[i], k),
-        }
+        one(i, theta, &from.x, &to.x, &self.x)
+    }
+
+    /// One charge at a part of the step; what rests does so to the last digit.
+    pub fn charge(&self, k: usize, theta: f64, from: &State, to: &State) -> f64 {
+        one(k, theta, &from.q, &to.q, &self.q)
     }
 
     /// The charges at a part of the step.
@@ -182,6 +183,14 @@ impl Dense {
 fn interpolate(theta: f64, from: &[f64], to: &[f64], k: &[Vec<f64>; 3], out: &mut [f64]) {
     for (i, out) in out.iter_mut().enumerate() {
         *out = between(theta, from[i], to[i], [k[0][i], k[1][i], k[2][i]]);
+    }
+}
+
+fn one(i: usize, theta: f64, from: &[f64], to: &[f64], k: &[Vec<f64>; 3]) -> f64 {
+    let k = [k[0][i], k[1][i], k[2][i]];
+    match from[i] == to[i] && k == [0.0; 3] {
+        true => to[i],
+        false => between(theta, from[i], to[i], k),
     }
 }
 

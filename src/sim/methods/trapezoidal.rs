@@ -29,6 +29,11 @@ pub(crate) fn step(
     let Work { beta, sum, error, dense, scratch, history, x, .. } = work;
     let missed = history.predict(from, to.t, x);
     to.x.copy_from_slice(x);
+    // Linear equations are solved from any guess.
+    let iterates = !network.system.is_linear();
+    if let Some(missed) = missed.filter(|_| iterates) {
+        history.lead(missed, h, &mut to.x);
+    }
     network.remember_junctions(&from.x);
     for (beta, (q, w)) in beta.iter_mut().zip(from.q.iter().zip(&from.w)) {
         *beta = -alpha * q - w;
@@ -40,6 +45,9 @@ pub(crate) fn step(
     }
     dense.hermite(history, from, to);
     let away = missed.map_or(f64::INFINITY, |missed| {
+        if iterates {
+            history.learn(missed, h, x, &to.x);
+        }
         led_away(ERROR / (missed + ERROR), x, &to.x, error);
         weighted(error, weights)
     });
