@@ -9,6 +9,7 @@ use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
 use super::output::Stopped;
+use super::system::System;
 
 /// Corrections of one row at most: an exponential that the guess overshoots comes down by one n·Vt each time.
 const MOST_CORRECTIONS: u32 = 40;
@@ -27,6 +28,8 @@ pub(crate) struct Inside {
     held: Vec<bool>,
     /// The unknowns that are asked for.
     asked: Vec<bool>,
+    /// Where every unknown asked for is one of a linear storage's own: unknown, charge, and charge for each unit of it.
+    stored: Vec<(u32, u32, f64)>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     pub factorised: Option<bool>,
     /// Whether what is interpolated in this step is too far from the equations; `None`: not yet asked.
@@ -45,6 +48,7 @@ impl Inside {
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
             asked: vec![true; system.equations()],
+            stored: vec![],
             factorised: None,
             rough: None,
             reached: State::new(f64::NAN, system.equations(), system.charges()),
@@ -61,6 +65,7 @@ impl Inside {
             inside.asked.fill(false);
             let columns = system.plain_outputs.iter();
             columns.for_each(|(_, unknown)| inside.asked[*unknown as usize] = true);
+            inside.stored = stored_alone(system).unwrap_or_default();
         }
         inside
     }
@@ -92,6 +97,14 @@ impl Inside {
         if !index2 && network.is_straight() {
             for (k, x) in self.point.x.iter_mut().enumerate() {
                 *x = work.dense.unknown(k, theta, from, to);
+            }
+            self.point.t = time;
+            return Ok(());
+        }
+        if !index2 && !work.dense.by_unknowns && !self.stored.is_empty() {
+            for (unknown, charge, unit) in &self.stored {
+                let q = work.dense.charge(*charge as usize, theta, from, to);
+                self.point.x[*unknown as usize] = q / unit;
             }
             self.point.t = time;
             return Ok(());
@@ -277,6 +290,18 @@ impl Inside {
         }
         Err(Cut::NonFinite { device: network.non_finite_law() })
     }
+}
+
+/// Of each unknown that an output column is, the linear storage that it alone makes up; nothing where one has none.
+fn stored_alone(system: &System) -> Option<Vec<(u32, u32, f64)>> {
+    let mut of_unknown = vec![None; system.equations()];
+    for k in (0..system.charges()).filter(|k| system.held[*k] && !system.curved[*k]) {
+        let mut entries = system.charges.row(k);
+        if let (Some((unknown, unit)), None) = (entries.next(), entries.next()) {
+            of_unknown[unknown] = (unit != 0.0).then_some((unknown as u32, k as u32, unit));
+        }
+    }
+    system.plain_outputs.iter().map(|(_, unknown)| of_unknown[*unknown as usize]).collect()
 }
 
 /// Takes a step beside the run's own, which go on as if it had not been taken.

@@ -3,7 +3,7 @@
 //! No step is ever cut for a row.
 
 use super::inside::Inside;
-use super::methods::Work;
+use super::methods::{Dense, Work};
 use super::network::Network;
 use super::newton::Cut;
 use super::op::State;
@@ -24,6 +24,9 @@ const MEASURED: f64 = 0.1;
 /// A line with one bend is at a quarter, at half or at three quarters at least this part as far from a straight one as
 /// at its bend.
 const STRAIGHT: f64 = 0.75;
+
+/// A step within which a column moves by less than this part of what it may be off a line is not asked.
+const QUIET: f64 = 0.25;
 
 /// What rounding may make of a column, as a part of its magnitude.
 const ROUNDING: f64 = 1e-12;
@@ -215,6 +218,10 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
+        if self.is_quiet(network, from, to, &work.dense) {
+            self.left.copy_from_slice(&self.row);
+            return Ok(());
+        }
         // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
         // only what is written is solved for. Within the long steps of methods of higher order what follows a source
         // moves in ways that their polynomials do not say, unless that is straight and all is linear; nor does the past say
@@ -280,6 +287,31 @@ impl<'a> Rows<'a> {
         }
         self.left = left;
         Ok(())
+    }
+
+    /// Whether columns move within a step by less than they may be off the line between its ends: after a jump steps are
+    /// short.
+    fn is_quiet(&self, network: &Network, from: &State, to: &State, dense: &Dense) -> bool {
+        let followed = dense.by_unknowns || dense.by_past;
+        let moved = |unknown: usize| {
+            let bends = dense.x.iter().map(|k| k[unknown].abs());
+            bends.fold((to.x[unknown] - from.x[unknown]).abs(), |sum, bend| sum + bend)
+        };
+        let mut columns = network.system.plain_outputs.iter();
+        followed
+            && network.system.law_columns.is_empty()
+            && columns
+                .all(|(c, unknown)| moved(*unknown as usize) <= QUIET * self.allowed(*c as usize))
+    }
+
+    /// How far a column may be off the line between two rows.
+    fn allowed(&self, column: usize) -> f64 {
+        let measured = self.low.len() - self.watched;
+        let part =
+            if column < measured { self.reltol.max(STRAIGHTEST) } else { MEASURED * self.reltol };
+        let (low, high) = (self.low[column], self.high[column]);
+        let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
+        (part * (high - low)).max(rounding)
     }
 
     /// The present row, in a vector that waits for use.
@@ -353,13 +385,9 @@ impl<'a> Rows<'a> {
         // Columns that are written at times of their own need not be straight between steps.
         let first = if self.has_times() { measured } else { 0 };
         for c in first..self.low.len() {
-            let part =
-                if c < measured { self.reltol.max(STRAIGHTEST) } else { MEASURED * self.reltol };
             let (a, b) = (left[c + 1], right[c + 1]);
             let off = (self.row[c + 1] - (a + theta * (b - a))).abs();
-            let (low, high) = (self.low[c], self.high[c]);
-            let rounding = (ROUNDING * low.abs().max(high.abs())).max(self.least);
-            most = most.max(off / (part * (high - low)).max(rounding));
+            most = most.max(off / self.allowed(c));
         }
         most
     }
