@@ -75,11 +75,14 @@ pub fn transient(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
-    const PILOT: f64 = 1e-2;
-    let needs_pilot = settings.tolerance == Tolerance::Scaled && settings.reltol < PILOT;
+    /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order are the cheapest then.
+    const PILOT: f64 = 1e-1;
+    const COARSE: f64 = 1e-2;
+    let needs_pilot = settings.tolerance == Tolerance::Scaled && settings.reltol < COARSE;
     let mut pilot = None;
     if needs_pilot {
-        let coarse = Settings { reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
+        let method = Method::TrBdf2;
+        let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
         let mut run = Run::new(system, &coarse, None, None);
         match run.run() {
             Ok(()) => {
