@@ -14,6 +14,7 @@ pub mod parse;
 pub mod dag;
 mod derivative;
 pub mod slope;
+mod branches;
 pub mod program;
 pub mod polynomial;
 pub mod print;

@@ -2,8 +2,11 @@
 //!
 //! Registers hold, in this order, the inputs that are used, the constants, and one result for each instruction;
 //! operands stand before results, so that a run is one pass. Instructions of the same operation stand together as far as
-//! their operands allow, so that what to do is asked once for many.
+//! their operands allow, so that what to do is asked once for many. Registers are as many as a power of two where they
+//! are few, so that no number needs to be compared with their end. What only one side of a choice needs is passed over
+//! where the other one is taken.
 
+use super::branches::Branches;
 use super::dag::{Dag, NodeId, Op};
 use super::functions::{Function, Value};
 use super::tree::{Binary, Table, Unary};
@@ -18,19 +21,31 @@ pub struct Program {
     inputs: Vec<u32>,
     constants: Vec<f64>,
     batches: Vec<Batch>,
-    /// The operands of each instruction; its result goes to the register of its own number behind the constants.
-    operands: Vec<[u32; 3]>,
+    code: Code,
     tables: Vec<Arc<Table>>,
     /// Their registers.
     outputs: Vec<u32>,
+}
+
+/// The registers of each instruction: that of its result, those of its operands.
+#[derive(Clone, Debug)]
+enum Code {
+    Few(Vec<[u16; 4]>),
+    Many(Vec<[u32; 4]>),
+}
+
+impl Default for Code {
+    fn default() -> Code {
+        Code::Few(vec![])
+    }
 }
 
 /// Instructions of one operation, one after another.
 #[derive(Clone, Copy, Debug)]
 struct Batch {
     operation: Operation,
-    /// Where they end.
-    end: u32,
+    /// How many they are.
+    count: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +69,13 @@ enum Operation {
     Two(fn(f64, f64) -> f64),
     Table(u32),
     Slope(u32),
+    /// So many batches and instructions follow that matter only where a register is not 0, or only where it is.
+    Unless {
+        register: u32,
+        holds: bool,
+        batches: u32,
+        instructions: u32,
+    },
 }
 
 /// Instructions are put together within so many: what is computed stays near where it is used.
@@ -106,6 +128,86 @@ fn operation(op: Op) -> Operation {
     }
 }
 
+/// A program while it is written.
+struct Writer<'a> {
+    dag: &'a Dag,
+    branches: Branches,
+    register: FxHashMap<NodeId, u32>,
+    /// The register of the first result.
+    first: usize,
+    code: Vec<[u32; 4]>,
+    batches: Vec<Batch>,
+}
+
+impl Writer<'_> {
+    /// Writes what is left of a branch below a node; before each choice what only its two sides need.
+    fn write(&mut self, branch: usize, limit: NodeId) {
+        let mut straight: Vec<NodeId> = vec![];
+        while let Some(node) = self.branches.next(branch, limit) {
+            if let Op::Select(condition, ..) = self.dag.op(node) {
+                for (side, holds) in self.branches.sides(branch, condition) {
+                    if !self.branches.waits(side, node) {
+                        continue;
+                    }
+                    self.batch(&std::mem::take(&mut straight));
+                    let (at, before) = (self.batches.len(), self.code.len());
+                    self.batches.push(Batch { operation: Operation::Not, count: 0 });
+                    self.write(side, node);
+                    self.batches[at].operation = Operation::Unless {
+                        register: self.register[&condition],
+                        holds,
+                        batches: (self.batches.len() - at - 1) as u32,
+                        instructions: (self.code.len() - before) as u32,
+                    };
+                }
+            }
+            straight.push(node);
+        }
+        self.batch(&straight);
+    }
+
+    /// Writes nodes, which stand in ascending order, one operation after another.
+    fn batch(&mut self, nodes: &[NodeId]) {
+        let dag = self.dag;
+        for window in nodes.chunks(WINDOW) {
+            // Operands of this window are known once their place in it is done; all others are.
+            let mut done = vec![false; window.len()];
+            let mut waiting: Vec<usize> = (0..window.len()).collect();
+            let inside: Vec<[Option<usize>; 3]> = window
+                .iter()
+                .map(|node| {
+                    let (operands, count) = dag.op(*node).operands();
+                    let place = |k| (k < count).then(|| window.binary_search(&operands[k]).ok());
+                    std::array::from_fn(|k| place(k).flatten())
+                })
+                .collect();
+            // The first that waits has all its operands; with it goes whatever of its kind has its own.
+            while let Some(kind) = waiting.first().map(|k| bare(dag.op(window[*k]))) {
+                let before = self.code.len();
+                waiting.retain(|k| {
+                    let op = dag.op(window[*k]);
+                    let known = inside[*k].iter().flatten().all(|operand| done[*operand]);
+                    if bare(op) != kind || !known {
+                        return true;
+                    }
+                    done[*k] = true;
+                    let (operands, count) = op.operands();
+                    let result = (self.first + self.code.len()) as u32;
+                    let mut places = [result, 0, 0, 0];
+                    for (place, operand) in places[1..].iter_mut().zip(&operands[..count]) {
+                        *place = self.register[operand];
+                    }
+                    self.register.insert(window[*k], result);
+                    self.code.push(places);
+                    false
+                });
+                let count = (self.code.len() - before) as u32;
+                self.batches.push(Batch { operation: operation(kind), count });
+            }
+        }
+    }
+}
+
 impl Program {
     /// The program of some nodes, in ascending order of nodes.
     pub fn compile(dag: &Dag, outputs: &[NodeId]) -> Program {
@@ -125,49 +227,29 @@ impl Program {
             }
         }
         let first = program.first_result();
-        let nodes: Vec<NodeId> =
+        let results: Vec<NodeId> =
             nodes.into_iter().filter(|node| !register.contains_key(node)).collect();
-        for window in nodes.chunks(WINDOW) {
-            // Operands of this window are known once their place in it is done; all others are.
-            let mut done = vec![false; window.len()];
-            let mut waiting: Vec<usize> = (0..window.len()).collect();
-            let inside: Vec<[Option<usize>; 3]> = window
-                .iter()
-                .map(|node| {
-                    let (operands, count) = dag.op(*node).operands();
-                    let place = |k| (k < count).then(|| window.binary_search(&operands[k]).ok());
-                    std::array::from_fn(|k| place(k).flatten())
-                })
-                .collect();
-            // The first that waits has all its operands; with it goes whatever of its kind has its own.
-            while let Some(kind) = waiting.first().map(|k| bare(dag.op(window[*k]))) {
-                waiting.retain(|k| {
-                    let op = dag.op(window[*k]);
-                    let known = inside[*k].iter().flatten().all(|operand| done[*operand]);
-                    if bare(op) != kind || !known {
-                        return true;
-                    }
-                    done[*k] = true;
-                    let (operands, count) = op.operands();
-                    let mut at = [0; 3];
-                    for (at, operand) in at.iter_mut().zip(&operands[..count]) {
-                        *at = register[operand];
-                    }
-                    register.insert(window[*k], (first + program.operands.len()) as u32);
-                    program.operands.push(at);
-                    false
-                });
-                let end = program.operands.len() as u32;
-                program.batches.push(Batch { operation: operation(kind), end });
-            }
-        }
+        let branches = Branches::of(dag, &results, outputs);
+        let mut writer = Writer { dag, branches, register, first, code: vec![], batches: vec![] };
+        writer.write(Branches::ALWAYS, NodeId(u32::MAX));
+        let Writer { register, code, batches, .. } = writer;
+        program.batches = batches;
         program.outputs = outputs.iter().map(|node| register[node]).collect();
+        let used = first + code.len();
+        // Numbers below the size of a file, which a u16 holds.
+        let few = |places: &[u32; 4]| places.map(|place| place as u16);
+        program.code = match FILES.iter().any(|size| used <= *size) {
+            true => Code::Few(code.iter().map(few).collect()),
+            false => Code::Many(code),
+        };
         program
     }
 
     /// Registers for [`run`](Program::run), with the constants in place.
     pub fn registers(&self) -> Vec<f64> {
-        let mut registers = vec![0.0; self.first_result() + self.operands.len()];
+        let used = self.first_result() + self.instructions();
+        let size = FILES.into_iter().find(|size| used <= *size).unwrap_or(used);
+        let mut registers = vec![0.0; size];
         registers[self.inputs.len()..self.first_result()].copy_from_slice(&self.constants);
         registers
     }
@@ -181,33 +263,56 @@ impl Program {
         for (register, input) in registers.iter_mut().zip(&self.inputs) {
             *register = inputs[*input as usize];
         }
-        let mut results = self.first_result();
-        let mut done = 0;
-        for Batch { operation, end } in &self.batches {
-            let operands = &self.operands[done..*end as usize];
-            let r = (&mut *registers, results, operands);
-            match *operation {
-                Operation::Add => two(r, |a, b| a + b),
-                Operation::Subtract => two(r, |a, b| a - b),
-                Operation::Multiply => two(r, |a, b| a * b),
-                Operation::Divide => two(r, |a, b| a / b),
-                Operation::Negate => one(r, |a| -a),
-                Operation::Power => two(r, power),
-                Operation::Not => one(r, |a| f64::from(a == 0.0)),
-                Operation::Truth(op) => two(r, |a, b| op.value(a, b)),
-                Operation::Select => three(r, |c, a, b| if c != 0.0 { a } else { b }),
-                Operation::Abs => one(r, f64::abs),
-                Operation::Sign => one(r, sign),
-                Operation::Sqrt => one(r, f64::sqrt),
-                Operation::Min => two(r, min),
-                Operation::Max => two(r, max),
-                Operation::One(f) => one(r, f),
-                Operation::Two(f) => two(r, f),
-                Operation::Table(k) => one(r, |a| self.tables[k as usize].value(a)),
-                Operation::Slope(k) => one(r, |a| self.tables[k as usize].slope(a)),
+        match &self.code {
+            Code::Few(code) => {
+                if let Ok(file) = <&mut [f64; SMALL]>::try_from(&mut *registers) {
+                    self.execute(code, file);
+                } else if let Ok(file) = <&mut [f64; MIDDLE]>::try_from(&mut *registers) {
+                    self.execute(code, file);
+                } else if let Ok(file) = <&mut [f64; LARGE]>::try_from(&mut *registers) {
+                    self.execute(code, file);
+                } else {
+                    let (file, _) = registers.as_chunks_mut::<LARGEST>();
+                    self.execute(code, &mut file[0]);
+                }
             }
-            results += operands.len();
-            done = *end as usize;
+            Code::Many(code) => self.execute(code, registers),
+        }
+    }
+
+    fn execute<P: Copy, R: Registers<P> + ?Sized>(&self, code: &[[P; 4]], r: &mut R) {
+        let mut left = code;
+        let mut batches = self.batches.as_slice();
+        while let [Batch { operation, count }, others @ ..] = batches {
+            batches = others;
+            let (now, rest) = left.split_at(*count as usize);
+            left = rest;
+            match *operation {
+                Operation::Unless { register, holds, batches: skipped, instructions } => {
+                    if (r.at(register as usize) != 0.0) != holds {
+                        batches = &batches[skipped as usize..];
+                        left = &left[instructions as usize..];
+                    }
+                }
+                Operation::Add => two(r, now, |a, b| a + b),
+                Operation::Subtract => two(r, now, |a, b| a - b),
+                Operation::Multiply => two(r, now, |a, b| a * b),
+                Operation::Divide => two(r, now, |a, b| a / b),
+                Operation::Negate => one(r, now, |a| -a),
+                Operation::Power => two(r, now, power),
+                Operation::Not => one(r, now, |a| f64::from(a == 0.0)),
+                Operation::Truth(op) => two(r, now, |a, b| op.value(a, b)),
+                Operation::Select => three(r, now, |c, a, b| if c != 0.0 { a } else { b }),
+                Operation::Abs => one(r, now, f64::abs),
+                Operation::Sign => one(r, now, sign),
+                Operation::Sqrt => one(r, now, f64::sqrt),
+                Operation::Min => two(r, now, min),
+                Operation::Max => two(r, now, max),
+                Operation::One(f) => one(r, now, f),
+                Operation::Two(f) => two(r, now, f),
+                Operation::Table(k) => one(r, now, |a| self.tables[k as usize].value(a)),
+                Operation::Slope(k) => one(r, now, |a| self.tables[k as usize].slope(a)),
+            }
         }
     }
 
@@ -233,7 +338,10 @@ impl Program {
 
     /// The number of instructions.
     pub fn instructions(&self) -> usize {
-        self.operands.len()
+        match &self.code {
+            Code::Few(code) => code.len(),
+            Code::Many(code) => code.len(),
+        }
     }
 
     fn first_result(&self) -> usize {
@@ -241,27 +349,85 @@ impl Program {
     }
 }
 
-/// Registers, where the first result goes, and the operands of each.
-type Room<'a> = (&'a mut [f64], usize, &'a [[u32; 3]]);
+/// Sizes of the files of registers that are few.
+const SMALL: usize = 64;
+const MIDDLE: usize = 256;
+const LARGE: usize = 1024;
+const LARGEST: usize = 4096;
+const FILES: [usize; 4] = [SMALL, MIDDLE, LARGE, LARGEST];
 
-#[inline(always)]
-fn three((registers, first, operands): Room, f: impl Fn(f64, f64, f64) -> f64) {
-    for (at, &[a, b, c]) in (first..).zip(operands) {
-        registers[at] = f(registers[a as usize], registers[b as usize], registers[c as usize]);
+/// What results are put into and taken from, by numbers of a kind.
+trait Registers<P> {
+    fn at(&self, place: usize) -> f64;
+    fn get(&self, place: P) -> f64;
+    fn put(&mut self, place: P, value: f64);
+}
+
+/// Of a power of two of registers every number stands for one.
+impl<const SIZE: usize> Registers<u16> for [f64; SIZE] {
+    #[inline(always)]
+    fn at(&self, place: usize) -> f64 {
+        self[place & (SIZE - 1)]
+    }
+
+    #[inline(always)]
+    fn get(&self, place: u16) -> f64 {
+        self[place as usize & (SIZE - 1)]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, place: u16, value: f64) {
+        self[place as usize & (SIZE - 1)] = value;
+    }
+}
+
+impl Registers<u32> for [f64] {
+    #[inline(always)]
+    fn at(&self, place: usize) -> f64 {
+        self[place]
+    }
+
+    #[inline(always)]
+    fn get(&self, place: u32) -> f64 {
+        self[place as usize]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, place: u32, value: f64) {
+        self[place as usize] = value;
     }
 }
 
 #[inline(always)]
-fn two((registers, first, operands): Room, f: impl Fn(f64, f64) -> f64) {
-    for (at, &[a, b, _]) in (first..).zip(operands) {
-        registers[at] = f(registers[a as usize], registers[b as usize]);
+fn three<P: Copy, R: Registers<P> + ?Sized>(
+    registers: &mut R,
+    code: &[[P; 4]],
+    f: impl Fn(f64, f64, f64) -> f64,
+) {
+    for &[to, a, b, c] in code {
+        registers.put(to, f(registers.get(a), registers.get(b), registers.get(c)));
     }
 }
 
 #[inline(always)]
-fn one((registers, first, operands): Room, f: impl Fn(f64) -> f64) {
-    for (at, &[a, ..]) in (first..).zip(operands) {
-        registers[at] = f(registers[a as usize]);
+fn two<P: Copy, R: Registers<P> + ?Sized>(
+    registers: &mut R,
+    code: &[[P; 4]],
+    f: impl Fn(f64, f64) -> f64,
+) {
+    for &[to, a, b, _] in code {
+        registers.put(to, f(registers.get(a), registers.get(b)));
+    }
+}
+
+#[inline(always)]
+fn one<P: Copy, R: Registers<P> + ?Sized>(
+    registers: &mut R,
+    code: &[[P; 4]],
+    f: impl Fn(f64) -> f64,
+) {
+    for &[to, a, ..] in code {
+        registers.put(to, f(registers.get(a)));
     }
 }
 
@@ -347,6 +513,25 @@ mod tests {
             let value = run(&dag, node, &x);
             if tame(&expr, &x) {
                 prop_assert!((value - expected).abs() <= 1e-9 * (1.0 + expected.abs()), "{value} {expected}");
+            }
+        }
+
+        #[test]
+        fn what_was_passed_over_leaves_no_trace(
+            expr in trees(),
+            points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f64), 3),
+        ) {
+            let mut dag = Dag::default();
+            let node = add(&mut dag, &expr);
+            let outputs = [node, dag.derivative(node, 0), dag.derivative(node, 1)];
+            let program = Program::compile(&dag, &outputs);
+            let mut registers = program.registers();
+            for x in &points {
+                program.run(x, &mut registers);
+                for (value, output) in program.outputs(&registers).zip(outputs) {
+                    let alone = run(&dag, output, x);
+                    prop_assert!(value.to_bits() == alone.to_bits() || (value.is_nan() && alone.is_nan()));
+                }
             }
         }
 
