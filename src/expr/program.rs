@@ -30,9 +30,15 @@ pub struct Program {
 /// The registers of each instruction: that of its result, those of its operands.
 #[derive(Clone, Debug)]
 enum Code {
+    /// Of long batches.
     Few(Vec<[u16; 4]>),
     Many(Vec<[u32; 4]>),
+    /// Each with its own operation, where hardly any two of one kind stand together.
+    Single(Vec<(Operation, [u16; 4])>),
 }
+
+/// Batches of fewer instructions on average cost more than they save.
+const LEAST_BATCH: usize = 2;
 
 impl Default for Code {
     fn default() -> Code {
@@ -57,7 +63,10 @@ enum Operation {
     Negate,
     Power,
     Not,
-    /// Comparisons and logic.
+    Less,
+    LessEqual,
+    Equal,
+    /// Other comparisons and logic.
     Truth(Binary),
     Select,
     Abs,
@@ -107,6 +116,9 @@ fn operation(op: Op) -> Operation {
             Binary::Multiply => Operation::Multiply,
             Binary::Divide => Operation::Divide,
             Binary::Power => Operation::Power,
+            Binary::Less => Operation::Less,
+            Binary::LessEqual => Operation::LessEqual,
+            Binary::Equal => Operation::Equal,
             truth => Operation::Truth(truth),
         },
         Op::One(Function::Abs, _) => Operation::Abs,
@@ -208,6 +220,28 @@ impl Writer<'_> {
     }
 }
 
+/// Instructions each with its own operation. What is passed over is counted in these.
+fn one_by_one(
+    batches: &[Batch],
+    mut code: impl Iterator<Item = [u16; 4]>,
+) -> Vec<(Operation, [u16; 4])> {
+    let mut starts = vec![0];
+    for Batch { operation, count } in batches {
+        let own = if matches!(operation, Operation::Unless { .. }) { 1 } else { *count };
+        starts.push(starts.last().unwrap_or(&0) + own);
+    }
+    let mut list = vec![];
+    for (k, Batch { operation, count }) in batches.iter().enumerate() {
+        if let Operation::Unless { register, holds, batches, .. } = *operation {
+            let instructions = starts[k + 1 + batches as usize] - starts[k + 1];
+            list.push((Operation::Unless { register, holds, batches, instructions }, [0; 4]));
+        } else {
+            list.extend(code.by_ref().take(*count as usize).map(|places| (*operation, places)));
+        }
+    }
+    list
+}
+
 impl Program {
     /// The program of some nodes, in ascending order of nodes.
     pub fn compile(dag: &Dag, outputs: &[NodeId]) -> Program {
@@ -239,6 +273,9 @@ impl Program {
         // Numbers below the size of a file, which a u16 holds.
         let few = |places: &[u32; 4]| places.map(|place| place as u16);
         program.code = match FILES.iter().any(|size| used <= *size) {
+            true if code.len() < LEAST_BATCH * program.batches.len() => {
+                Code::Single(one_by_one(&program.batches, code.iter().map(few)))
+            }
             true => Code::Few(code.iter().map(few).collect()),
             false => Code::Many(code),
         };
@@ -263,24 +300,29 @@ impl Program {
         for (register, input) in registers.iter_mut().zip(&self.inputs) {
             *register = inputs[*input as usize];
         }
-        match &self.code {
-            Code::Few(code) => {
-                if let Ok(file) = <&mut [f64; SMALL]>::try_from(&mut *registers) {
-                    self.execute(code, file);
-                } else if let Ok(file) = <&mut [f64; MIDDLE]>::try_from(&mut *registers) {
-                    self.execute(code, file);
-                } else if let Ok(file) = <&mut [f64; LARGE]>::try_from(&mut *registers) {
-                    self.execute(code, file);
-                } else {
-                    let (file, _) = registers.as_chunks_mut::<LARGEST>();
-                    self.execute(code, &mut file[0]);
-                }
-            }
-            Code::Many(code) => self.execute(code, registers),
+        if let Code::Many(code) = &self.code {
+            self.batches(code, registers);
+        } else if let Ok(file) = <&mut [f64; SMALL]>::try_from(&mut *registers) {
+            self.few(file);
+        } else if let Ok(file) = <&mut [f64; MIDDLE]>::try_from(&mut *registers) {
+            self.few(file);
+        } else if let Ok(file) = <&mut [f64; LARGE]>::try_from(&mut *registers) {
+            self.few(file);
+        } else {
+            let (file, _) = registers.as_chunks_mut::<LARGEST>();
+            self.few(&mut file[0]);
         }
     }
 
-    fn execute<P: Copy, R: Registers<P> + ?Sized>(&self, code: &[[P; 4]], r: &mut R) {
+    fn few<R: Registers<u16>>(&self, r: &mut R) {
+        match &self.code {
+            Code::Single(code) => self.singles(code, r),
+            Code::Few(code) => self.batches(code, r),
+            Code::Many(_) => {}
+        }
+    }
+
+    fn batches<P: Copy, R: Registers<P> + ?Sized>(&self, code: &[[P; 4]], r: &mut R) {
         let mut left = code;
         let mut batches = self.batches.as_slice();
         while let [Batch { operation, count }, others @ ..] = batches {
@@ -294,25 +336,57 @@ impl Program {
                         left = &left[instructions as usize..];
                     }
                 }
-                Operation::Add => two(r, now, |a, b| a + b),
-                Operation::Subtract => two(r, now, |a, b| a - b),
-                Operation::Multiply => two(r, now, |a, b| a * b),
-                Operation::Divide => two(r, now, |a, b| a / b),
-                Operation::Negate => one(r, now, |a| -a),
-                Operation::Power => two(r, now, power),
-                Operation::Not => one(r, now, |a| f64::from(a == 0.0)),
-                Operation::Truth(op) => two(r, now, |a, b| op.value(a, b)),
-                Operation::Select => three(r, now, |c, a, b| if c != 0.0 { a } else { b }),
-                Operation::Abs => one(r, now, f64::abs),
-                Operation::Sign => one(r, now, sign),
-                Operation::Sqrt => one(r, now, f64::sqrt),
-                Operation::Min => two(r, now, min),
-                Operation::Max => two(r, now, max),
-                Operation::One(f) => one(r, now, f),
-                Operation::Two(f) => two(r, now, f),
-                Operation::Table(k) => one(r, now, |a| self.tables[k as usize].value(a)),
-                Operation::Slope(k) => one(r, now, |a| self.tables[k as usize].slope(a)),
+                operation => self.apply(operation, now, r),
             }
+        }
+    }
+
+    fn singles<R: Registers<u16>>(&self, code: &[(Operation, [u16; 4])], r: &mut R) {
+        let mut left = code;
+        while let [(operation, places), rest @ ..] = left {
+            left = rest;
+            match *operation {
+                Operation::Unless { register, holds, instructions, .. } => {
+                    if (r.at(register as usize) != 0.0) != holds {
+                        left = &left[instructions as usize..];
+                    }
+                }
+                operation => self.apply(operation, std::slice::from_ref(places), r),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn apply<P: Copy, R: Registers<P> + ?Sized>(
+        &self,
+        operation: Operation,
+        code: &[[P; 4]],
+        r: &mut R,
+    ) {
+        match operation {
+            Operation::Add => two(r, code, |a, b| a + b),
+            Operation::Subtract => two(r, code, |a, b| a - b),
+            Operation::Multiply => two(r, code, |a, b| a * b),
+            Operation::Divide => two(r, code, |a, b| a / b),
+            Operation::Negate => one(r, code, |a| -a),
+            Operation::Power => two(r, code, power),
+            Operation::Not => one(r, code, |a| f64::from(a == 0.0)),
+            Operation::Less => two(r, code, |a, b| f64::from(a < b)),
+            Operation::LessEqual => two(r, code, |a, b| f64::from(a <= b)),
+            Operation::Equal => two(r, code, |a, b| f64::from(a == b)),
+            Operation::Truth(op) => two(r, code, |a, b| op.value(a, b)),
+            Operation::Select => three(r, code, |c, a, b| if c != 0.0 { a } else { b }),
+            Operation::Abs => one(r, code, f64::abs),
+            Operation::Sign => one(r, code, sign),
+            Operation::Sqrt => one(r, code, f64::sqrt),
+            Operation::Min => two(r, code, min),
+            Operation::Max => two(r, code, max),
+            Operation::One(f) => one(r, code, f),
+            Operation::Two(f) => two(r, code, f),
+            Operation::Table(k) => one(r, code, |a| self.tables[k as usize].value(a)),
+            Operation::Slope(k) => one(r, code, |a| self.tables[k as usize].slope(a)),
+            // Those who run a program know it.
+            Operation::Unless { .. } => {}
         }
     }
 
@@ -341,6 +415,12 @@ impl Program {
         match &self.code {
             Code::Few(code) => code.len(),
             Code::Many(code) => code.len(),
+            Code::Single(code) => {
+                let passes = |(operation, _): &&(Operation, _)| {
+                    !matches!(operation, Operation::Unless { .. })
+                };
+                code.iter().filter(passes).count()
+            }
         }
     }
 

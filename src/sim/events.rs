@@ -338,9 +338,10 @@ impl Network<'_> {
         for mode in 0..self.system.modes.len() {
             let (a, b) = pair(controls, mode);
             self.tracks[mode].see(a, b);
-            let hold = self.hold(mode);
-            if hold == FREE && self.excess(mode, a, b) > self.room(mode) {
-                self.set_mode(mode, answer(self.system.modes[mode].guard, a, b));
+            // Nothing follows from the mode of a free condition: what is known of the laws stays so.
+            if self.hold(mode) == FREE && self.excess(mode, a, b) > self.room(mode) {
+                let slot = self.slot(mode);
+                self.modes[slot] = answer(self.system.modes[mode].guard, a, b);
             }
         }
     }

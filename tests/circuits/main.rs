@@ -9,6 +9,7 @@ mod fourier;
 mod poles;
 mod sensitivity;
 mod measures;
+mod condensed;
 mod meshes;
 mod difficult_decks;
 mod decks_in_ngspice;
