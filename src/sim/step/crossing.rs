@@ -116,8 +116,8 @@ impl Run<'_> {
         crossed.clear();
         for (i, theta) in PLACES.iter().enumerate() {
             let values = match i {
-                0 => &controls.left,
                 4 => &controls.right,
+                0 if curved => &controls.left,
                 _ if curved => {
                     work.dense.unknowns(*theta, state, next, &mut work.x);
                     network.controls(&work.x, state.t + theta * h, &mut controls.inside);
