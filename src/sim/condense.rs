@@ -13,8 +13,9 @@
 //! with it. What is written, remembered, switched by or stated to begin with stays an unknown, and so does what stores:
 //! charges and fluxes, their equations, and everything that an error test must see stay as they are.
 //!
-//! Exact but for rounding, since pivots are chosen as in a factorisation with threshold: no unknown is expressed by
-//! multiples of others that are, in the equations' own scales, more than [`THRESHOLD`] times as large.
+//! Exact but for rounding, since pivots are chosen as in a factorisation with threshold: of an unknown that other equations
+//! speak of too, a row of several terms is not solved where that takes multiples of others that are, in the equations' own
+//! scales, more than [`THRESHOLD`] times as large.
 
 use super::compile::compile;
 use super::explain::{Failure, FailureKind};
@@ -27,8 +28,8 @@ use crate::expr::{Dag, Node};
 use crate::trace::Sink;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The largest multiple, in scales that make the largest entry of each row and column 1.
-const THRESHOLD: f64 = 10.0;
+/// The largest multiple, in scales that make the entries of rows and columns about 1.
+const THRESHOLD: f64 = 100.0;
 /// Entries that an elimination may add besides as many as it removes.
 const FILL: usize = 16;
 /// Nodes of a law's tree after a replacement.
@@ -227,14 +228,7 @@ impl<'a> Condenser<'a> {
                 readers[*c as usize].insert(k as u32);
             });
         }
-        let mut scales = vec![0.0f64; n];
-        for row in &rows {
-            let largest = row.terms.values().fold(0.0f64, |most, value| most.max(value.abs()));
-            for (c, value) in &row.terms {
-                scales[*c as usize] = scales[*c as usize].max(value.abs() / largest);
-            }
-        }
-        scales.iter_mut().filter(|scale| **scale > 0.0).for_each(|scale| *scale = scale.recip());
+        let scales = scales(&rows, n);
         Condenser {
             stamps,
             rows: rows.into_iter().map(Some).collect(),
@@ -279,7 +273,10 @@ impl<'a> Condenser<'a> {
                 // Nothing else speaks of it.
                 0
             } else {
-                if scaled(c, value) * THRESHOLD < largest || !self.defines(row, *c) {
+                // A row of two says what one is as exactly as what the other is, and one that alone speaks of an unknown
+                // says all that is known of it.
+                let sure = row.terms.len() <= 2 || others == 0;
+                if !(sure || scaled(c, value) * THRESHOLD >= largest) || !self.defines(row, *c) {
                     continue;
                 }
                 let entries = row.terms.len() - 1 + row.laws.len() + row.sources.len();
@@ -459,6 +456,35 @@ impl<'a> Condenser<'a> {
         }
         condensed
     }
+}
+
+/// Scales of the unknowns with which the entries of rows and columns are about 1: in turn each is divided by the geometric
+/// mean of its largest and its smallest entry (J. K. Reid's and A. R. Curtis's scaling by a cheap way to about the same).
+fn scales(rows: &[Row], n: usize) -> Vec<f64> {
+    const TURNS: usize = 8;
+    let mut of_rows = vec![1.0f64; rows.len()];
+    let mut of_columns = vec![1.0f64; n];
+    // Largest and smallest entry.
+    let none = (0.0f64, f64::INFINITY);
+    let see = |(most, least): (f64, f64), size: f64| (most.max(size), least.min(size));
+    let mean = |(most, least): (f64, f64)| match most > 0.0 {
+        true => (most.sqrt() * least.sqrt()).recip(),
+        false => 1.0,
+    };
+    for _ in 0..TURNS {
+        for (row, scale) in rows.iter().zip(&mut of_rows) {
+            let sizes = row.terms.iter().map(|(c, value)| value.abs() * of_columns[*c as usize]);
+            *scale = mean(sizes.fold(none, see));
+        }
+        let mut seen = vec![none; n];
+        for (row, scale) in rows.iter().zip(&of_rows) {
+            for (c, value) in &row.terms {
+                seen[*c as usize] = see(seen[*c as usize], value.abs() * scale);
+            }
+        }
+        of_columns = seen.into_iter().map(mean).collect();
+    }
+    of_columns
 }
 
 /// For each number its place in a list, where it has one.

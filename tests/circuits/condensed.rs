@@ -71,6 +71,18 @@ fn shipped_netlists_run_alike_with_fewer_unknowns() {
     assert!(smaller >= 15, "{smaller}");
 }
 
+#[test]
+fn tight_tolerances_are_met_with_fewer_unknowns() {
+    // What follows must do so to rounding: a current of 1e-3 as a difference of efforts of 1e4 would end such a run.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("netlists/eha_one_line.cir");
+    let mut run = prepared("tight", &std::fs::read_to_string(path).unwrap());
+    let settings = run.settings.as_mut().expect("a run over time");
+    (settings.reltol, settings.stop) = (1e-10, 0.4);
+    let [whole, small] = systems(&run);
+    let off = difference(&course(&run, &whole), &course(&run, &small));
+    assert!(off < 1e-8, "{off:e}");
+}
+
 /// A servo as chains of laws, gains and sources of 0 V; what is saved follows.
 const SERVO: &str = "a servo\nVref ref 0 SIN(0 1 2)\nBe e 0 V=V(ref)-V(x)\nBu u 0 V=10*tanh(V(e)*3)\nEm m1 0 u 0 2\n\
                      Vi m1 m2 0\nRm m2 m3 0.5\nLm m3 m4 10m\nHb m4 0 Vx 0.3\nFt 0 w Vi 0.3\nVx w w2 0\nRw w2 0 2\n\
