@@ -271,6 +271,14 @@ impl Run {
         }
     }
 
+    /// Of a run whose rows nobody keeps: those between the ends of steps are not made where no measure asks for them.
+    pub fn keep_no_rows(&mut self) {
+        let ends = self.measures().all(|measure| measure.kind.is_of_end());
+        if let Some(settings) = self.settings.as_mut().filter(|_| ends) {
+            settings.between = !self.circuit.harmonics.is_empty();
+        }
+    }
+
     /// Runs, and sends rows to a sink.
     ///
     /// # Errors

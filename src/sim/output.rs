@@ -53,6 +53,7 @@ type Piece = (Vec<f64>, u32, f64);
 pub(crate) struct Rows<'a> {
     sink: &'a mut dyn Sink,
     interval: Interval,
+    between: bool,
     start: f64,
     stop: f64,
     /// Times closer than this are the same.
@@ -84,6 +85,7 @@ impl<'a> Rows<'a> {
         Rows {
             sink,
             interval: settings.rows.clone(),
+            between: settings.between,
             start: settings.start,
             stop: settings.stop,
             slack: 1e-12 * settings.stop,
@@ -171,6 +173,11 @@ impl<'a> Rows<'a> {
             self.inside.between(network, from, to, due, index2, weights, work)?;
             self.write(network, due)?;
         }
+    }
+
+    /// Whether rows are made between the ends of steps, to be written or measured.
+    pub fn follows_within(&self) -> bool {
+        self.follows_steps() && self.between
     }
 
     /// Whether rows are made at every step, to be written or measured.

@@ -45,6 +45,8 @@ pub struct Settings {
     pub uic: bool,
     /// When rows are wanted.
     pub rows: Interval,
+    /// Whether those that follow steps are to stand between their ends too, wherever a line would not be straight.
+    pub between: bool,
     /// Relative tolerance of one step.
     pub reltol: f64,
     /// Absolute tolerance of currents, A.
@@ -99,6 +101,7 @@ impl Settings {
             step: stop / 50.0,
             uic: true,
             rows: Interval::Steps,
+            between: true,
             reltol: 1e-3,
             abstol: 1e-12,
             vntol: 1e-6,

@@ -467,7 +467,7 @@ impl<'a> Run<'a> {
         if let Some(rows) = &mut self.rows {
             let Run { network, state, next, weights, work, index2, .. } = self;
             let mut outcome = Ok(());
-            if rows.follows_steps() {
+            if rows.follows_within() {
                 outcome = rows.pieces(network, state, next, *index2, weights, work);
             }
             if outcome.is_ok() && rows.has_times() {

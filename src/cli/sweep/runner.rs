@@ -157,6 +157,9 @@ impl<'a> Runner<'a> {
             return Some(row);
         };
         prepared.watch(stop.clone(), None);
+        if self.traces.is_none() {
+            prepared.keep_no_rows();
+        }
         let outcome = self.simulate(run, &prepared);
         if stop.load(Ordering::Relaxed) {
             return None;

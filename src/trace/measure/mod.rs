@@ -72,6 +72,11 @@ pub enum Kind<C = usize, V = Value> {
 }
 
 impl<C, V> Kind<C, V> {
+    /// Whether it asks for nothing but the last row.
+    pub fn is_of_end(&self) -> bool {
+        matches!(self, Kind::Formula(_))
+    }
+
     /// The same over other columns and values; none where one of them has none.
     pub fn try_map<D, W>(
         &self,
