@@ -25,7 +25,8 @@ use super::step;
 use super::system::System;
 use crate::circuit::stamps::{Law, LawStamp, Leaf, Stamps, Terms, UnknownId};
 use crate::expr::{Dag, Node};
-use crate::trace::Sink;
+use crate::trace::{Nowhere, Sink};
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The largest multiple, in scales that make the entries of rows and columns about 1.
@@ -36,6 +37,8 @@ const FILL: usize = 16;
 const LARGEST_LAW: usize = 256;
 /// Circuits of more unknowns stay as they are: there the order of elimination is the factorisation's concern.
 const MOST_UNKNOWNS: usize = 100_000;
+/// How often all equations are gone through: chains are mostly followed in one go.
+const MOST_ROUNDS: usize = 64;
 /// What is left of a difference after so many units of the last place of its terms is rounding.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
@@ -85,15 +88,6 @@ impl Sink for Counted<'_> {
     }
 }
 
-/// Where nobody looks.
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn row(&mut self, _: &[f64]) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
 /// The same circuit with fewer unknowns; `None` where laws leave nothing to replace.
 pub(crate) fn condense(stamps: &Stamps) -> Option<Stamps> {
     let has_laws = stamps.laws.iter().any(|law| law.junction.is_none());
@@ -103,7 +97,7 @@ pub(crate) fn condense(stamps: &Stamps) -> Option<Stamps> {
     let mut condenser = Condenser::new(stamps);
     // The cheapest first: what they leave is often cheaper then.
     const CAPS: [usize; 5] = [0, 1, 2, 4, usize::MAX];
-    while CAPS.iter().any(|cap| condenser.round(*cap)) {}
+    (0..MOST_ROUNDS).any(|_| !CAPS.iter().any(|cap| condenser.round(*cap)));
     condenser.is_smaller().then(|| condenser.finish())
 }
 
@@ -149,13 +143,6 @@ struct Condenser<'a> {
     readers: Vec<BTreeSet<u32>>,
     /// Scales of the unknowns.
     scales: Vec<f64>,
-}
-
-/// How a row is used up.
-struct Plan {
-    unknown: u32,
-    /// Entries that it makes, at most.
-    cost: usize,
 }
 
 impl<'a> Condenser<'a> {
@@ -249,49 +236,41 @@ impl<'a> Condenser<'a> {
             if self.bound[r] || self.rows[r].is_none() {
                 continue;
             }
-            if let Some(plan) = self.plan(r).filter(|plan| plan.cost <= cap) {
-                self.eliminate(r, plan.unknown);
+            if let Some(unknown) = self.choose(r, cap) {
+                self.eliminate(r, unknown);
                 any = true;
             }
         }
         any
     }
 
-    /// The unknown that a row is best solved for.
-    fn plan(&self, r: usize) -> Option<Plan> {
+    /// The unknown that a row is best solved for, at no more than a cost: of entries that it makes.
+    fn choose(&self, r: usize, cap: usize) -> Option<u32> {
         let row = self.rows[r].as_ref()?;
         let scaled = |c: &u32, value: &f64| value.abs() * self.scales[*c as usize];
         let largest = row.terms.iter().map(|(c, value)| scaled(c, value)).fold(0.0, f64::max);
-        let mut best: Option<Plan> = None;
-        for (c, value) in &row.terms {
-            if self.kept[*c as usize] {
-                continue;
-            }
-            let readers = &self.readers[*c as usize];
+        let entries = row.terms.len() + row.laws.len() + row.sources.len() - 1;
+        let mut candidates: SmallVec<[(usize, u32); 4]> = SmallVec::new();
+        for (c, value) in row.terms.iter().filter(|(c, _)| !self.kept[**c as usize]) {
             let others = self.columns[*c as usize].len() - 1;
-            let cost = if others == 0 && readers.is_empty() {
-                // Nothing else speaks of it.
-                0
-            } else {
-                // A row of two says what one is as exactly as what the other is, and one that alone speaks of an unknown
-                // says all that is known of it.
-                let sure = row.terms.len() <= 2 || others == 0;
-                if !(sure || scaled(c, value) * THRESHOLD >= largest) || !self.defines(row, *c) {
-                    continue;
-                }
-                let entries = row.terms.len() - 1 + row.laws.len() + row.sources.len();
-                let uses = others + readers.len();
-                let cost = entries * uses;
-                if cost > (entries + uses + 1).max(FILL) {
-                    continue;
-                }
-                cost
-            };
-            if best.as_ref().is_none_or(|best| cost < best.cost) {
-                best = Some(Plan { unknown: *c, cost });
+            let uses = others + self.readers[*c as usize].len();
+            let cost = entries * uses;
+            // A row of two says what one is as exactly as what the other is, and one that alone speaks of an unknown
+            // says all that is known of it.
+            let sure = row.terms.len() <= 2 || others == 0;
+            let fits = cost <= cap.min((entries + uses + 1).max(FILL));
+            if fits && (sure || scaled(c, value) * THRESHOLD >= largest) {
+                candidates.push((cost, *c));
             }
         }
-        best
+        candidates.sort_unstable();
+        let mut candidates = candidates.into_iter().map(|(_, c)| c);
+        candidates.find(|c| {
+            // Where nothing else speaks of it, the row goes with it.
+            let alone =
+                self.columns[*c as usize].len() == 1 && self.readers[*c as usize].is_empty();
+            alone || self.defines(row, *c)
+        })
     }
 
     /// Whether a row gives an expression that may stand wherever the unknown does.

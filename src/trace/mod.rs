@@ -77,6 +77,16 @@ pub trait Sink {
     }
 }
 
+/// Where rows go that nobody reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Nowhere;
+
+impl Sink for Nowhere {
+    fn row(&mut self, _: &[f64]) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
 impl Sink for Trace {
     fn row(&mut self, values: &[f64]) -> std::io::Result<()> {
         for (column, value) in self.columns.iter_mut().zip(values) {

@@ -3,15 +3,7 @@
 use bondspice::bond::elaborate::Overrides;
 use bondspice::cli::run::prepare;
 use bondspice::source::SourceMap;
-use bondspice::trace::Sink;
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn row(&mut self, _: &[f64]) -> std::io::Result<()> {
-        Ok(())
-    }
-}
+use bondspice::trace::Nowhere;
 
 /// How often a run asks for memory, and its steps.
 fn asked(deck: &str, until: &str) -> (u64, u64) {

@@ -12,7 +12,7 @@ use crate::sim::FailureKind;
 use crate::source::{SourceMap, Span};
 use crate::trace::formats::Heading;
 use crate::trace::measure::{Measure, Outcome};
-use crate::trace::{Sink, csv};
+use crate::trace::{Nowhere, csv};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
@@ -193,14 +193,5 @@ impl<'a> Runner<'a> {
             Err(failure) if failure.kind == FailureKind::Interrupted => Ok(vec![]),
             Err(failure) => Err(failure.diagnostic),
         }
-    }
-}
-
-/// Where rows go that nobody reads.
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn row(&mut self, _: &[f64]) -> io::Result<()> {
-        Ok(())
     }
 }
