@@ -310,10 +310,17 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// r = G·x + f − b, with the laws' values of the last evaluation.
-    pub fn residual(&self, x: &[f64], t: f64, r: &mut [f64]) {
+    /// r = f − b of linear equations where all unknowns are 0, after a linearisation.
+    pub fn residual_at_zero(&self, t: f64, r: &mut [f64]) {
         r.fill(0.0);
-        self.system.conductances.add_product(1.0, x, r);
+        self.subtract_drives(t, r);
+        for (state, group) in self.groups.iter().zip(&self.system.groups) {
+            add_to_equations(&state.constants, &group.targets, r);
+        }
+    }
+
+    /// r −= b
+    fn subtract_drives(&self, t: f64, r: &mut [f64]) {
         for (row, value) in &self.system.constants {
             r[*row as usize] -= self.drive * value;
         }
@@ -329,14 +336,15 @@ impl<'a> Network<'a> {
                 r[*row as usize] -= factor * value;
             }
         }
+    }
+
+    /// r = G·x + f − b, with the laws' values of the last evaluation.
+    pub fn residual(&self, x: &[f64], t: f64, r: &mut [f64]) {
+        r.fill(0.0);
+        self.system.conductances.add_product(1.0, x, r);
+        self.subtract_drives(t, r);
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
-            for (value, target) in state.values.iter().zip(&group.targets) {
-                if let Target::Equations(into) = target {
-                    for (row, factor) in into {
-                        r[*row as usize] += factor * value;
-                    }
-                }
-            }
+            add_to_equations(&state.values, &group.targets, r);
         }
         if self.gmin != 0.0 {
             for ((r, x), anchor) in r.iter_mut().zip(x).zip(&self.anchor).take(self.system.nodes) {
@@ -760,6 +768,17 @@ impl<'a> Network<'a> {
             }
         }
         None
+    }
+}
+
+/// Adds values of laws to the equations that they go into.
+fn add_to_equations(values: &[f64], targets: &[Target], r: &mut [f64]) {
+    for (value, target) in values.iter().zip(targets) {
+        if let Target::Equations(into) = target {
+            for (row, factor) in into {
+                r[*row as usize] += factor * value;
+            }
+        }
     }
 }
 

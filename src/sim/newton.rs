@@ -130,6 +130,9 @@ pub(crate) fn solve_stage(
     if !linear && stage.unconfirmed > 0.0 && near::solve(network, stage, x, q, scratch) {
         return Ok(());
     }
+    if linear {
+        return solve_linear(network, stage, x, q, scratch);
+    }
     let mut before = f64::INFINITY;
     let mut damping = false;
     for iteration in 0..MOST {
@@ -138,21 +141,13 @@ pub(crate) fn solve_stage(
         network.charges(x, q);
         let residual = &mut scratch.residual[..n];
         stage_residual(network, stage, x, q, residual, &mut scratch.rates);
-        if iteration == 0 && !linear && residual.iter().all(|r| *r == 0.0) {
+        if iteration == 0 && residual.iter().all(|r| *r == 0.0) {
             // At rest, where the matrix may be singular, the guess is the solution.
             return Ok(());
         }
         network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
         scratch.near.forget();
         network.solve_dynamic(residual);
-        if linear {
-            x.iter_mut().zip(residual.iter()).for_each(|(x, dx)| *x -= dx);
-            if x.iter().any(|x| !x.is_finite()) {
-                return Err(Cut::NonFinite { device: None });
-            }
-            network.charges(x, q);
-            return Ok(());
-        }
         let last = &mut scratch.before[..n];
         let damped = damping && swings(residual, last, stage.weights);
         let part = if damped { SWING } else { 1.0 };
@@ -203,6 +198,30 @@ pub(crate) fn solve_stage(
     network.charges(x, q);
     let worst = worst_row(network, stage, x, q, scratch);
     Err(Cut::NoConvergence { worst })
+}
+
+/// A stage of linear equations, from no guess: W(α)·x = b − f(0) − A·β.
+fn solve_linear(
+    network: &mut Network,
+    stage: &Stage,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+) -> Result<(), Cut> {
+    network.statistics.iterations += 1;
+    network.linearise(x, stage.t, false);
+    network.factorise_dynamic(stage.alpha).map_err(|singular| explain(network, singular))?;
+    scratch.near.forget();
+    let right = &mut scratch.residual[..x.len()];
+    network.residual_at_zero(stage.t, right);
+    network.system.rates.add_transposed(1.0, stage.beta, right);
+    network.solve_dynamic(right);
+    x.iter_mut().zip(right.iter()).for_each(|(x, negative)| *x = -negative);
+    if x.iter().any(|x| !x.is_finite()) {
+        return Err(Cut::NonFinite { device: None });
+    }
+    network.charges(x, q);
+    Ok(())
 }
 
 pub(super) fn stage_residual(
