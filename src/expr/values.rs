@@ -75,10 +75,14 @@ pub(super) fn signed_power(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { sign(x) * power(x.abs(), y) }
 }
 
-/// The real part of x^y. Whole exponents keep the sign of an odd power exactly.
+/// The real part of x^y. Whole exponents keep the sign of an odd power exactly, and roots of a negative number that are
+/// wholly imaginary have none, rather than rounding.
 pub(super) fn real_power(x: f64, y: f64) -> f64 {
     if x >= 0.0 || y == y.trunc() || x.is_nan() {
         return power(x, y);
+    }
+    if (y - y.trunc()).abs() == 0.5 {
+        return 0.0;
     }
     power(-x, y) * libm::cos(std::f64::consts::PI * y)
 }
@@ -93,6 +97,10 @@ mod tests {
         assert_eq!(power(-2.0, -2.0), 0.25);
         assert_eq!(power(0.0, 0.0), 1.0);
         assert!(power(-1.0, 0.4).is_nan());
+        assert_eq!(
+            (real_power(-4.0, 0.5), real_power(-4.0, -1.5), real_power(4.0, 0.5)),
+            (0.0, 0.0, 2.0)
+        );
         assert_eq!(signed_power(-4.0, 0.5), -2.0);
         assert_eq!(power_of_abs(-3.0, 3.0), 27.0);
         assert_eq!(modulo(-1.0, 3.0), 2.0);
