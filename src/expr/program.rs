@@ -20,7 +20,6 @@ pub struct Program {
     /// The inputs that are used; input `inputs[r]` goes to register r.
     inputs: Vec<u32>,
     constants: Vec<f64>,
-    batches: Vec<Batch>,
     code: Code,
     tables: Vec<Arc<Table>>,
     /// Their registers.
@@ -30,9 +29,8 @@ pub struct Program {
 /// The registers of each instruction: that of its result, those of its operands.
 #[derive(Clone, Debug)]
 enum Code {
-    /// Of long batches.
-    Few(Vec<[u16; 4]>),
-    Many(Vec<[u32; 4]>),
+    Few(Vec<Batch>, Vec<[u16; 4]>),
+    Many(Vec<Batch>, Vec<[u32; 4]>),
     /// Each with its own operation, where hardly any two of one kind stand together.
     Single(Vec<(Operation, [u16; 4])>),
 }
@@ -42,7 +40,7 @@ const LEAST_BATCH: usize = 2;
 
 impl Default for Code {
     fn default() -> Code {
-        Code::Few(vec![])
+        Code::Single(vec![])
     }
 }
 
@@ -267,17 +265,16 @@ impl Program {
         let mut writer = Writer { dag, branches, register, first, code: vec![], batches: vec![] };
         writer.write(Branches::ALWAYS, NodeId(u32::MAX));
         let Writer { register, code, batches, .. } = writer;
-        program.batches = batches;
         program.outputs = outputs.iter().map(|node| register[node]).collect();
         let used = first + code.len();
         // Numbers below the size of a file, which a u16 holds.
         let few = |places: &[u32; 4]| places.map(|place| place as u16);
         program.code = match FILES.iter().any(|size| used <= *size) {
-            true if code.len() < LEAST_BATCH * program.batches.len() => {
-                Code::Single(one_by_one(&program.batches, code.iter().map(few)))
+            true if code.len() < LEAST_BATCH * batches.len() => {
+                Code::Single(one_by_one(&batches, code.iter().map(few)))
             }
-            true => Code::Few(code.iter().map(few).collect()),
-            false => Code::Many(code),
+            true => Code::Few(batches, code.iter().map(few).collect()),
+            false => Code::Many(batches, code),
         };
         program
     }
@@ -300,8 +297,8 @@ impl Program {
         for (register, input) in registers.iter_mut().zip(&self.inputs) {
             *register = inputs[*input as usize];
         }
-        if let Code::Many(code) = &self.code {
-            self.batches(code, registers);
+        if let Code::Many(batches, code) = &self.code {
+            self.batches(batches, code, registers);
         } else if let Ok(file) = <&mut [f64; SMALL]>::try_from(&mut *registers) {
             self.few(file);
         } else if let Ok(file) = <&mut [f64; MIDDLE]>::try_from(&mut *registers) {
@@ -317,14 +314,18 @@ impl Program {
     fn few<R: Registers<u16>>(&self, r: &mut R) {
         match &self.code {
             Code::Single(code) => self.singles(code, r),
-            Code::Few(code) => self.batches(code, r),
-            Code::Many(_) => {}
+            Code::Few(batches, code) => self.batches(batches, code, r),
+            Code::Many(..) => {}
         }
     }
 
-    fn batches<P: Copy, R: Registers<P> + ?Sized>(&self, code: &[[P; 4]], r: &mut R) {
+    fn batches<P: Copy, R: Registers<P> + ?Sized>(
+        &self,
+        mut batches: &[Batch],
+        code: &[[P; 4]],
+        r: &mut R,
+    ) {
         let mut left = code;
-        let mut batches = self.batches.as_slice();
         while let [Batch { operation, count }, others @ ..] = batches {
             batches = others;
             let (now, rest) = left.split_at(*count as usize);
@@ -413,8 +414,8 @@ impl Program {
     /// The number of instructions.
     pub fn instructions(&self) -> usize {
         match &self.code {
-            Code::Few(code) => code.len(),
-            Code::Many(code) => code.len(),
+            Code::Few(_, code) => code.len(),
+            Code::Many(_, code) => code.len(),
             Code::Single(code) => {
                 let passes = |(operation, _): &&(Operation, _)| {
                     !matches!(operation, Operation::Unless { .. })

@@ -127,12 +127,11 @@ impl<L> Expr<L> {
         Expr::new(Node::choice(condition, then, otherwise), Span::NONE)
     }
 
-    /// The number of levels of the tree.
-    pub fn depth(&self) -> usize {
-        let mut deepest = 0;
+    /// Calls `visit` for every node with its level, from 1 on; depth costs no stack.
+    fn levels(&self, visit: &mut dyn FnMut(usize)) {
         let mut open = vec![(self, 1)];
         while let Some((expr, level)) = open.pop() {
-            deepest = deepest.max(level);
+            visit(level);
             match &*expr.node {
                 Node::Number(_) | Node::Leaf(_) => {}
                 Node::Unary(_, a) | Node::Table(a, _) => open.push((a, level + 1)),
@@ -143,7 +142,20 @@ impl<L> Expr<L> {
                 }
             }
         }
+    }
+
+    /// The number of levels of the tree.
+    pub fn depth(&self) -> usize {
+        let mut deepest = 0;
+        self.levels(&mut |level| deepest = deepest.max(level));
         deepest
+    }
+
+    /// The number of nodes of the tree.
+    pub fn size(&self) -> usize {
+        let mut count = 0;
+        self.levels(&mut |_| count += 1);
+        count
     }
 
     /// The value of a literal.

@@ -98,7 +98,7 @@ pub(crate) fn condense(stamps: &Stamps) -> Option<Stamps> {
     // The cheapest first: what they leave is often cheaper then.
     const CAPS: [usize; 5] = [0, 1, 2, 4, usize::MAX];
     (0..MOST_ROUNDS).any(|_| !CAPS.iter().any(|cap| condenser.round(*cap)));
-    condenser.is_smaller().then(|| condenser.finish())
+    condenser.gone.contains(&true).then(|| condenser.finish())
 }
 
 /// A law, or the law of a charge.
@@ -114,7 +114,7 @@ struct Item {
 
 impl Item {
     fn new(law: Law, free: bool) -> Item {
-        Item { reads: reads(&law).collect(), size: size(&law), law, free }
+        Item { reads: reads(&law).into_iter().collect(), size: law.size(), law, free }
     }
 }
 
@@ -197,7 +197,7 @@ impl<'a> Condenser<'a> {
         let junctions = stamps.laws.iter().filter(|law| law.junction.is_some());
         let junctions = junctions.map(|stamp| &stamp.law);
         for law in outputs.chain(remembered).chain(controls).chain(junctions) {
-            reads(law).for_each(|unknown| kept[unknown as usize] = true);
+            reads(law).into_iter().for_each(|unknown| kept[unknown as usize] = true);
         }
         for junction in stamps.laws.iter().filter_map(|law| law.junction) {
             junction.across.iter().flatten().for_each(|node| kept[node.0 as usize] = true);
@@ -358,10 +358,6 @@ impl<'a> Condenser<'a> {
         sum.unwrap_or_else(|| Law::number(0.0))
     }
 
-    fn is_smaller(&self) -> bool {
-        self.gone.contains(&true)
-    }
-
     /// The stamps of what is left.
     fn finish(self) -> Stamps {
         let stamps = self.stamps;
@@ -486,35 +482,18 @@ fn subtract(entries: &mut BTreeMap<u32, f64>, key: u32, value: f64) -> bool {
 }
 
 /// The unknowns that a law speaks of, as often as it does.
-fn reads(law: &Law) -> impl Iterator<Item = u32> {
+fn reads(law: &Law) -> Vec<u32> {
     let mut unknowns = vec![];
     law.leaves(&mut |leaf, _| {
         if let Leaf::Unknown(id) = leaf {
             unknowns.push(id.0);
         }
     });
-    unknowns.into_iter()
+    unknowns
 }
 
 fn occurrences(law: &Law, unknown: u32) -> usize {
-    reads(law).filter(|own| *own == unknown).count()
-}
-
-/// Number of nodes of a tree.
-fn size(law: &Law) -> usize {
-    let mut count = 0;
-    let mut open = vec![law];
-    while let Some(law) = open.pop() {
-        count += 1;
-        match &*law.node {
-            Node::Number(_) | Node::Leaf(_) => {}
-            Node::Unary(_, a) | Node::Table(a, _) => open.push(a),
-            Node::Binary(_, a, b) => open.extend([a, b]),
-            Node::Call(_, arguments) => open.extend(arguments),
-            Node::If(c, a, b) => open.extend([c, a, b]),
-        }
-    }
-    count
+    reads(law).into_iter().filter(|own| *own == unknown).count()
 }
 
 /// The factors of a law that is a sum of multiples of unknowns, and nothing besides.

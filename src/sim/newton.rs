@@ -125,14 +125,13 @@ pub(crate) fn solve_stage(
     q: &mut [f64],
     scratch: &mut Scratch,
 ) -> Result<(), Cut> {
-    let n = x.len();
-    let linear = network.system.is_linear();
-    if !linear && stage.unconfirmed > 0.0 && near::solve(network, stage, x, q, scratch) {
-        return Ok(());
-    }
-    if linear {
+    if network.system.is_linear() {
         return solve_linear(network, stage, x, q, scratch);
     }
+    if stage.unconfirmed > 0.0 && near::solve(network, stage, x, q, scratch) {
+        return Ok(());
+    }
+    let n = x.len();
     let mut before = f64::INFINITY;
     let mut damping = false;
     for iteration in 0..MOST {

@@ -30,8 +30,8 @@ pub(crate) fn step(
     let missed = history.predict(from, to.t, x);
     to.x.copy_from_slice(x);
     // Linear equations are solved from any guess.
-    let iterates = !network.system.is_linear();
-    if let Some(missed) = missed.filter(|_| iterates) {
+    let followed = missed.filter(|_| !network.system.is_linear());
+    if let Some(missed) = followed {
         history.lead(missed, h, &mut to.x);
     }
     network.remember_junctions(&from.x);
@@ -44,10 +44,10 @@ pub(crate) fn step(
         *rate = alpha * q + beta;
     }
     dense.hermite(history, from, to);
+    if let Some(missed) = followed {
+        history.learn(missed, h, x, &to.x);
+    }
     let away = missed.map_or(f64::INFINITY, |missed| {
-        if iterates {
-            history.learn(missed, h, x, &to.x);
-        }
         led_away(ERROR / (missed + ERROR), x, &to.x, error);
         weighted(error, weights)
     });
