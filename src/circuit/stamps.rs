@@ -152,6 +152,45 @@ pub struct Mode {
     pub off: f64,
     /// Its state at the start where the card says so; else by `control` (1 above `on`, else 0).
     pub initial: Option<bool>,
+    /// What the controlling quantity is over time, where that is known beforehand: then nobody reads `control`.
+    pub course: Option<Course>,
+}
+
+/// A sum of multiples of waveforms that consist of straight lines.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// What does not change.
+    pub constant: f64,
+    /// Factor and waveform.
+    pub terms: Vec<(f64, Waveform)>,
+}
+
+impl Course {
+    /// Just after `t`: the value, its slope, the time until which that holds, and what rounding may make of the value.
+    pub fn line(&self, t: f64) -> Line {
+        let mut line = Line { value: self.constant, slope: 0.0, end: f64::INFINITY, rounding: 0.0 };
+        let mut size = self.constant.abs();
+        for (factor, waveform) in &self.terms {
+            let segment = waveform.segment(t);
+            let (value, slope) = (factor * segment.value(t), factor * segment.derivative(t));
+            line.value += value;
+            line.slope += slope;
+            line.end = line.end.min(segment.end);
+            size += value.abs() + (slope * t).abs();
+        }
+        line.rounding = 8.0 * f64::EPSILON * size;
+        line
+    }
+}
+
+/// A piece of a [`Course`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct Line {
+    pub value: f64,
+    pub slope: f64,
+    pub end: f64,
+    pub rounding: f64,
 }
 
 /// A term of b that follows from the past of `input`.

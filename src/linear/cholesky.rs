@@ -5,8 +5,8 @@
 //! a matrix is, its pivots tell: they have the signs of the diagonal, and are not much smaller or larger than it.
 //! The order and the places of all entries are worked out once; the rest is arithmetic in place.
 
-use super::Pattern;
 use super::singletons::Unfit;
+use super::{Pattern, paths};
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
@@ -34,7 +34,11 @@ pub struct Order {
     greater: Vec<u32>,
     /// Rows of the matrix in the order of elimination.
     order: Vec<u32>,
+    /// So many of them went as nodes of paths.
+    of_paths: usize,
     symbolic: SymbolicCholesky<u32>,
+    /// Where it is no blocks: columns one after another that have as many entries, diagonals included.
+    runs: Vec<Run>,
     /// The triangle that the factorisation reads, column by column.
     triangle: Pattern,
     /// The place in it of each diagonal, then of each edge in the order of `greater`.
@@ -80,19 +84,13 @@ impl Order {
                 greater[range].iter().map(move |i| (j as u32, *i))
             })
         };
-        let (graph, _) = Pattern::from_triplets(n, &edges().collect::<Vec<_>>());
-        let (mut order, mut place) = (vec![0u32; n], vec![0u32; n]);
-        let scratch = amd::order_scratch::<u32>(n, graph.len());
-        let mut memory = MemBuffer::try_new(scratch).ok()?;
-        amd::order(
-            &mut order,
-            &mut place,
-            symbolic_of(&graph),
-            amd::Control::default(),
-            MemStack::new(&mut memory),
-        )
-        .ok()?;
-        drop((graph, memory));
+        let mut left = n;
+        let order = paths::order(n, edges(), |rest| {
+            left = rest.n;
+            by_degree(rest)
+        })?;
+        let mut place = vec![0u32; n];
+        order.iter().enumerate().for_each(|(k, node)| place[*node as usize] = k as u32);
         let triangle = |upper: bool| {
             let pairs: Vec<(u32, u32)> = (0..n as u32)
                 .map(|j| (j, j))
@@ -112,19 +110,34 @@ impl Order {
             CholeskySymbolicParams::default(),
         )
         .ok()?;
-        if matches!(symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)) {
-            (triangle_used, places) = triangle(false);
+        let mut runs = vec![];
+        match symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(_) => (triangle_used, places) = triangle(false),
+            SymbolicCholeskyRaw::Simplicial(factor) => runs = Run::all(factor.col_ptr()),
         }
         Some(Order {
             nodes: nodes.to_vec(),
             starts: starts.to_vec(),
             greater: greater.to_vec(),
             order: order.iter().map(|node| nodes[*node as usize]).collect(),
+            of_paths: n - left,
             symbolic,
+            runs,
             triangle: triangle_used,
             places,
         })
     }
+}
+
+/// Nodes of a graph by approximate minimum degree.
+fn by_degree(graph: &Pattern) -> Option<Vec<u32>> {
+    let (mut order, mut place) = (vec![0u32; graph.n], vec![0u32; graph.n]);
+    let scratch = amd::order_scratch::<u32>(graph.n, graph.len());
+    let mut memory = MemBuffer::try_new(scratch).ok()?;
+    let control = amd::Control::default();
+    let stack = MemStack::new(&mut memory);
+    amd::order(&mut order, &mut place, symbolic_of(graph), control, stack).ok()?;
+    Some(order)
 }
 
 fn symbolic_of(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
@@ -226,6 +239,11 @@ impl Cholesky {
         })
     }
 
+    /// Whether most of it is long paths, which are solved many nodes at a time.
+    pub fn is_of_paths(&self) -> bool {
+        2 * self.order.of_paths > self.order.nodes.len()
+    }
+
     /// Factors new values.
     pub fn load(&mut self, values: &[f64]) -> Result<(), Unfit> {
         for (own, [slot, mirror]) in self.values.iter_mut().zip(&self.slots) {
@@ -285,13 +303,15 @@ impl Cholesky {
             *own = b[*row as usize];
         }
         match self.order.symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(factor) => solve_sparse(
-                factor.col_ptr(),
-                factor.row_idx(),
-                &self.factors,
-                &self.inverse,
-                &mut self.vector,
-            ),
+            SymbolicCholeskyRaw::Simplicial(factor) => {
+                let lower = Lower {
+                    runs: &self.order.runs,
+                    starts: factor.col_ptr(),
+                    rows: factor.row_idx(),
+                    factors: &self.factors,
+                };
+                lower.solve(&self.inverse, &mut self.vector);
+            }
             SymbolicCholeskyRaw::Supernodal(factor) => {
                 let (vector, block) = (&mut self.vector, &mut self.block);
                 solve_blocks(factor, &self.factors, &self.inverse, vector, block);
@@ -314,21 +334,105 @@ fn inverse(pivot: f64, diagonal: f64) -> Result<f64, Unfit> {
     if (LOST..=GROWN).contains(&ratio) { Ok(1.0 / pivot) } else { Err(Unfit::Values) }
 }
 
-/// L·D·Lᵀ·x = b in place; in each column the diagonal comes first.
-fn solve_sparse(starts: &[u32], rows: &[u32], factors: &[f64], inverse: &[f64], x: &mut [f64]) {
-    let below = |j: usize| starts[j] as usize + 1..starts[j + 1] as usize;
-    for j in 0..inverse.len() {
-        let value = x[j];
-        for (row, l) in rows[below(j)].iter().zip(&factors[below(j)]) {
-            x[*row as usize] -= l * value;
+/// Columns one after another that have as many entries, the diagonals included.
+#[derive(Clone, Copy)]
+struct Run {
+    first: usize,
+    count: usize,
+    length: usize,
+}
+
+impl Run {
+    fn all(starts: &[u32]) -> Vec<Run> {
+        let mut runs: Vec<Run> = vec![];
+        for (j, ends) in starts.windows(2).enumerate() {
+            let length = (ends[1] - ends[0]) as usize;
+            match runs.last_mut() {
+                Some(run) if run.length == length => run.count += 1,
+                _ => runs.push(Run { first: j, count: 1, length }),
+            }
+        }
+        runs
+    }
+}
+
+/// L by columns, in each of which the diagonal comes first; a loop for each run of columns of few entries.
+struct Lower<'a> {
+    runs: &'a [Run],
+    starts: &'a [u32],
+    rows: &'a [u32],
+    factors: &'a [f64],
+}
+
+impl Lower<'_> {
+    /// L·D·Lᵀ·x = b in place.
+    fn solve(&self, inverse: &[f64], x: &mut [f64]) {
+        for run in self.runs {
+            match run.length {
+                1 => {}
+                2 => self.forward::<2>(run, x),
+                3 => self.forward::<3>(run, x),
+                4 => self.forward::<4>(run, x),
+                _ => (run.first..run.first + run.count).for_each(|j| {
+                    let (rows, factors) = self.below(j);
+                    let value = x[j];
+                    for (row, l) in rows.iter().zip(factors) {
+                        x[*row as usize] -= l * value;
+                    }
+                }),
+            }
+        }
+        for run in self.runs.iter().rev() {
+            match run.length {
+                1 => self.backward::<1>(run, inverse, x),
+                2 => self.backward::<2>(run, inverse, x),
+                3 => self.backward::<3>(run, inverse, x),
+                4 => self.backward::<4>(run, inverse, x),
+                _ => (run.first..run.first + run.count).rev().for_each(|j| {
+                    let (rows, factors) = self.below(j);
+                    let mut sum = x[j] * inverse[j];
+                    for (row, l) in rows.iter().zip(factors) {
+                        sum -= l * x[*row as usize];
+                    }
+                    x[j] = sum;
+                }),
+            }
         }
     }
-    for j in (0..inverse.len()).rev() {
-        let mut sum = x[j] * inverse[j];
-        for (row, l) in rows[below(j)].iter().zip(&factors[below(j)]) {
-            sum -= l * x[*row as usize];
+
+    fn below(&self, j: usize) -> (&[u32], &[f64]) {
+        let range = self.starts[j] as usize + 1..self.starts[j + 1] as usize;
+        (&self.rows[range.clone()], &self.factors[range])
+    }
+
+    /// The columns of a run of N entries each.
+    fn columns<const N: usize>(&self, run: &Run) -> (&[[u32; N]], &[[f64; N]]) {
+        let range = self.starts[run.first] as usize..self.starts[run.first + run.count] as usize;
+        (self.rows[range.clone()].as_chunks().0, self.factors[range].as_chunks().0)
+    }
+
+    fn forward<const N: usize>(&self, run: &Run, x: &mut [f64]) {
+        let (rows, factors) = self.columns::<N>(run);
+        for (k, (rows, factors)) in rows.iter().zip(factors).enumerate() {
+            let value = x[run.first + k];
+            for i in 1..N {
+                x[rows[i] as usize] -= factors[i] * value;
+            }
         }
-        x[j] = sum;
+    }
+
+    fn backward<const N: usize>(&self, run: &Run, inverse: &[f64], x: &mut [f64]) {
+        let (rows, factors) = self.columns::<N>(run);
+        let inverse = &inverse[run.first..run.first + run.count];
+        for (k, ((rows, factors), inverse)) in
+            rows.iter().zip(factors).zip(inverse).enumerate().rev()
+        {
+            let mut sum = x[run.first + k] * inverse;
+            for i in 1..N {
+                sum -= factors[i] * x[rows[i] as usize];
+            }
+            x[run.first + k] = sum;
+        }
     }
 }
 

@@ -11,6 +11,9 @@ use super::{Lu, Pattern, SMALL, Singular};
 /// Up to this many multiplications an LU stays as it is, whatever the matrix.
 const CHEAP: usize = 100_000;
 
+/// Paths of fewer nodes are short: that each waits for the one before costs little there.
+const LONG: usize = 256;
+
 /// Factors of a real matrix.
 #[derive(Debug)]
 pub struct Factors {
@@ -53,6 +56,13 @@ impl Factors {
         let whole = |lu| Factors { kind: Kind::Whole(Box::new(lu)), work: vec![0.0; pattern.n] };
         let small = pattern.n <= SMALL;
         if small {
+            let paths = (pattern.n >= LONG)
+                .then(|| Parts::find(pattern, values, keep_zeros, true, orders))
+                .flatten()
+                .filter(|parts| matches!(&parts.core, Core::Symmetric(core) if core.is_of_paths()));
+            if let Some(parts) = paths {
+                return Ok(parts.into_factors(pattern.n));
+            }
             let lu = Lu::factor(pattern, values)?;
             if lu.operations() <= CHEAP {
                 return Ok(whole(lu));

@@ -17,6 +17,7 @@ mod gilbert;
 mod lu;
 mod markowitz;
 mod matching;
+mod paths;
 mod pattern;
 mod pivots;
 pub mod relations;

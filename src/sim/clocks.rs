@@ -5,11 +5,11 @@
 //! on a grid and the change found by bisection to the last bit. All values are those just after their time.
 
 use super::conditions::Question;
-use crate::circuit::stamps::{Law, Leaf};
+use crate::circuit::stamps::{Course, Law, Leaf, Line};
 use crate::expr::values::sign;
 use crate::expr::{Binary, Dag, NodeId};
 
-/// A condition over time alone.
+/// A condition, or the state of a switch, over time alone.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
     question: Question,
@@ -22,7 +22,12 @@ enum Shape {
     Line { constant: f64, slope: f64, terms: Vec<(u32, f64)> },
     /// Anything else: a and b.
     Curve(Box<[Law; 2]>),
+    /// A switch whose control has a course: 1 when that rises through `on`, 0 when it falls through `off`.
+    Switch { course: Course, on: f64, off: f64 },
 }
+
+/// A change is looked for in so many pieces of a course at once; where there is none, nothing changes at their end.
+const PIECES: usize = 100_000;
 
 /// How many intervals a run is searched in for changes that have no closed form.
 const GRID: f64 = 16384.0;
@@ -53,14 +58,20 @@ impl Clock {
         Clock { question, shape }
     }
 
-    /// Whether its changes are searched for, and do not depend on other modes.
-    pub fn is_searched(&self) -> bool {
-        matches!(self.shape, Shape::Curve(_))
+    /// That of a switch.
+    pub fn of_switch(course: Course, on: f64, off: f64) -> Clock {
+        Clock { question: Question::Side, shape: Shape::Switch { course, on, off } }
     }
 
-    /// Its mode just after `t`.
-    pub fn value(&self, t: f64, modes: &[f64], stop: f64) -> f64 {
+    /// Whether its changes are searched for, and do not depend on other modes.
+    pub fn is_searched(&self) -> bool {
+        matches!(self.shape, Shape::Curve(_) | Shape::Switch { .. })
+    }
+
+    /// Its mode just after `t`, where it is `before` just before.
+    pub fn value(&self, t: f64, before: f64, modes: &[f64], stop: f64) -> f64 {
         match &self.shape {
+            Shape::Switch { course, on, off } => switched(&course.line(t), [*on, *off], before),
             Shape::Line { constant, slope, terms } => {
                 let (mut at, mut size) = (constant + slope * t, constant.abs());
                 size += (slope * t).abs();
@@ -95,6 +106,7 @@ impl Clock {
                 (edge - offset) / slope
             }
             Shape::Curve(guards) => self.search(guards, t, value, stop),
+            Shape::Switch { course, on, off } => next_switched(course, [*on, *off], t, value, stop),
         };
         if next > t { next } else { f64::INFINITY }
     }
@@ -149,4 +161,40 @@ impl Clock {
         }
         f64::INFINITY
     }
+}
+
+/// The state of a switch at the beginning of a line.
+fn switched(line: &Line, [on, off]: [f64; 2], before: f64) -> f64 {
+    let past = |edge: f64, way: f64| {
+        let by = way * (line.value - edge);
+        by > line.rounding || (by >= -line.rounding && way * line.slope > 0.0)
+    };
+    match before > 0.5 {
+        true if past(off, -1.0) => 0.0,
+        false if past(on, 1.0) => 1.0,
+        _ => before,
+    }
+}
+
+/// The time after `t` at which a switch changes.
+fn next_switched(course: &Course, [on, off]: [f64; 2], t: f64, value: f64, stop: f64) -> f64 {
+    let (edge, way) = if value > 0.5 { (off, -1.0) } else { (on, 1.0) };
+    let mut at = t;
+    for _ in 0..PIECES {
+        let line = course.line(at);
+        if at > t && switched(&line, [on, off], value) != value {
+            return at;
+        }
+        if way * line.slope > 0.0 {
+            let root = at + (edge - line.value) / line.slope;
+            if root > at && root < line.end {
+                return root;
+            }
+        }
+        if !(line.end > at && line.end < stop) {
+            return f64::INFINITY;
+        }
+        at = line.end;
+    }
+    at
 }

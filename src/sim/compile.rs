@@ -1,5 +1,6 @@
 //! Stamps → System: affine laws become static stamps, the rest one program; patterns and places are worked out once.
 
+use super::clocks::Clock;
 use super::condense::condense;
 use super::conditions::{Conditions, Question, SLOTS};
 use super::explain;
@@ -474,7 +475,10 @@ impl Builder<'_> {
                 span: Span::NONE,
                 slot: slot as u32,
                 guard: Guard::Switch { on: mode.on, off: mode.off, initial: mode.initial },
-                clock: None,
+                clock: mode
+                    .course
+                    .as_ref()
+                    .map(|course| Clock::of_switch(course.clone(), mode.on, mode.off)),
             });
         }
         for (k, condition) in conditions.list.iter().enumerate() {

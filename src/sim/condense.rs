@@ -18,6 +18,7 @@
 //! scales, more than [`THRESHOLD`] times as large.
 
 use super::compile::compile;
+use super::driven;
 use super::explain::{Failure, FailureKind};
 use super::settings::Settings;
 use super::statistics::Statistics;
@@ -94,11 +95,25 @@ pub(crate) fn condense(stamps: &Stamps) -> Option<Stamps> {
     if !has_laws || stamps.unknowns.len() > MOST_UNKNOWNS {
         return None;
     }
+    let mut scheduled;
+    let mut stamps = stamps;
+    let courses = driven::courses(stamps);
+    if courses.iter().any(Option::is_some) {
+        scheduled = stamps.clone();
+        for (mode, course) in scheduled.modes.iter_mut().zip(courses) {
+            if course.is_some() {
+                mode.control = Law::number(0.0);
+            }
+            mode.course = course;
+        }
+        stamps = &scheduled;
+    }
     let mut condenser = Condenser::new(stamps);
     // The cheapest first: what they leave is often cheaper then.
     const CAPS: [usize; 5] = [0, 1, 2, 4, usize::MAX];
     (0..MOST_ROUNDS).any(|_| !CAPS.iter().any(|cap| condenser.round(*cap)));
-    condenser.gone.contains(&true).then(|| condenser.finish())
+    let known = stamps.modes.iter().any(|mode| mode.course.is_some());
+    (known || condenser.gone.contains(&true)).then(|| condenser.finish())
 }
 
 /// A law, or the law of a charge.
@@ -400,6 +415,8 @@ impl<'a> Condenser<'a> {
         for (source, into) in condensed.sources.iter_mut().zip(of_sources) {
             source.into = into;
         }
+        // Corners of sources that nothing follows from end no step.
+        condensed.sources.retain(|source| !source.into.is_empty());
         let mut items = self.items.iter();
         let laws = stamps.laws.iter().zip(of_laws).zip(items.by_ref());
         condensed.laws = laws

@@ -175,10 +175,10 @@ impl Network<'_> {
         for mode in 0..self.system.modes.len() {
             let data = &self.system.modes[mode];
             match (&data.clock, data.guard) {
-                (Some(_), _) => {}
-                (None, Guard::Switch { initial, .. }) => {
+                (_, Guard::Switch { initial, .. }) => {
                     self.set_mode(mode, if initial == Some(true) { 1.0 } else { 0.0 });
                 }
+                (Some(_), _) => {}
                 (None, _) => self.set_hold(mode, FREE),
             }
         }
@@ -206,11 +206,16 @@ impl Network<'_> {
                 continue;
             }
             let now = if due { next.max(t) } else { t };
-            let value = clock.value(now, &self.modes, self.stop);
+            let before = self.mode(mode);
+            let value = clock.value(now, before, &self.modes, self.stop);
             self.tracks[mode].next = clock.next(now, value, &self.modes, self.stop);
-            if value != self.mode(mode) {
+            if value != before {
                 self.set_mode(mode, value);
                 self.changed();
+                self.struck = Some((mode, value));
+                if matches!(self.system.modes[mode].guard, Guard::Switch { .. }) {
+                    self.change_pivots();
+                }
             }
         }
     }

@@ -4,7 +4,7 @@
 //! frozen network, so that algebraic relations hold. Where that says too little, shorter steps lead from the step's start
 //! to the time: in circuits of index 2, and where a junction bends the solution within the step.
 
-use super::methods::{self, Dense, Work, trbdf2};
+use super::methods::{self, Asked, Dense, Work, trbdf2};
 use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
@@ -30,6 +30,8 @@ pub(crate) struct Inside {
     asked: Vec<bool>,
     /// Where every unknown asked for is one of a linear storage's own: unknown, charge, and charge for each unit of it.
     stored: Vec<(u32, u32, f64)>,
+    /// What of a step's polynomials is asked for, where that is not everything.
+    few: Option<Asked>,
     /// Whether the frozen network is factorised for this step; `None`: not yet tried.
     pub factorised: Option<bool>,
     /// Whether what is interpolated in this step is too far from the equations; `None`: not yet asked.
@@ -49,6 +51,7 @@ impl Inside {
             held: system.held.clone(),
             asked: vec![true; system.equations()],
             stored: vec![],
+            few: None,
             factorised: None,
             rough: None,
             reached: State::new(f64::NAN, system.equations(), system.charges()),
@@ -66,6 +69,10 @@ impl Inside {
             let columns = system.plain_outputs.iter();
             columns.for_each(|(_, unknown)| inside.asked[*unknown as usize] = true);
             inside.stored = stored_alone(system).unwrap_or_default();
+            let unknowns = (0..system.equations() as u32).filter(|k| inside.asked[*k as usize]);
+            let charges = inside.stored.iter().map(|(_, charge, _)| *charge);
+            let few = Asked { unknowns: unknowns.collect(), charges: charges.collect() };
+            inside.few = (!system.has_junctions()).then_some(few);
         }
         inside
     }
@@ -75,6 +82,11 @@ impl Inside {
         self.factorised = None;
         self.rough = None;
         self.reached.t = f64::NAN;
+    }
+
+    /// Makes what is mostly asked of a step's polynomials.
+    pub fn look_within(&self, from: &State, to: &State, work: &mut Work) {
+        work.complete(from, to, self.few.as_ref());
     }
 
     /// Puts the values at a time inside a step into `self.point`.
@@ -90,12 +102,15 @@ impl Inside {
         work: &mut Work,
     ) -> Result<(), Stopped> {
         let theta = (time - from.t) / (to.t - from.t);
+        if self.few.is_none() {
+            work.complete(from, to, None);
+        }
         // Rows of linear circuits meet their equations to rounding, whatever the tolerance.
         if index2 && (!work.dense.by_unknowns || network.system.groups.is_empty()) {
             return self.shorter_step(network, from, to, time, weights, work);
         }
         if !index2 && network.is_straight() {
-            for (k, x) in self.point.x.iter_mut().enumerate() {
+            for (k, x) in self.point.x.iter_mut().enumerate().filter(|(k, _)| self.asked[*k]) {
                 *x = work.dense.unknown(k, theta, from, to);
             }
             self.point.t = time;
@@ -109,6 +124,7 @@ impl Inside {
             self.point.t = time;
             return Ok(());
         }
+        work.complete(from, to, None);
         let asked = &self.asked;
         let rough =
             *self.rough.get_or_insert_with(|| is_rough(network, from, to, asked, weights, work));

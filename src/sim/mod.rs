@@ -10,6 +10,7 @@ mod compile;
 mod condense;
 mod conditions;
 mod dc;
+mod driven;
 mod events;
 mod explain;
 mod inside;

@@ -85,6 +85,8 @@ pub(crate) struct Network<'a> {
     pub modes: Vec<f64>,
     /// What is known of each mode's guard.
     pub tracks: Vec<Track>,
+    /// The mode over time that changed last at the last corner, and its value.
+    pub struck: Option<(usize, f64)>,
     /// End of the run.
     pub stop: f64,
     /// A conductance from every node to ground, while an operating point is sought; otherwise 0.
@@ -138,6 +140,7 @@ impl<'a> Network<'a> {
             segments: system.sources.iter().map(|s| s.waveform.segment(t)).collect(),
             modes: vec![0.0; system.mode_slots],
             tracks: vec![Track::default(); system.modes.len()],
+            struck: None,
             stop,
             gmin: 0.0,
             anchor: vec![0.0; system.equations()],
@@ -174,6 +177,7 @@ impl<'a> Network<'a> {
             }
         }
         let events = self.statistics.events;
+        self.struck = None;
         self.set_clocks(t, Some(slack));
         let new = corner || self.statistics.events != events;
         corner |= self.memories.pass_corner(t, slack, new);

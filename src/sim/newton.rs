@@ -215,8 +215,13 @@ fn solve_linear(
     network.residual_at_zero(stage.t, right);
     network.system.rates.add_transposed(1.0, stage.beta, right);
     network.solve_dynamic(right);
-    x.iter_mut().zip(right.iter()).for_each(|(x, negative)| *x = -negative);
-    if x.iter().any(|x| !x.is_finite()) {
+    // 0·x is no number where x is none, or infinite.
+    let mut nothing = 0.0;
+    for (x, negative) in x.iter_mut().zip(right.iter()) {
+        *x = -negative;
+        nothing += 0.0 * negative;
+    }
+    if nothing != 0.0 {
         return Err(Cut::NonFinite { device: None });
     }
     network.charges(x, q);

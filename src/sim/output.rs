@@ -164,6 +164,7 @@ impl<'a> Rows<'a> {
         work: &mut Work,
     ) -> Result<(), Stopped> {
         self.inside.begin();
+        self.inside.look_within(from, to, work);
         loop {
             let due = self.next_time();
             if due >= to.t - self.slack {
@@ -225,6 +226,7 @@ impl<'a> Rows<'a> {
         }
         self.at_end(network, to, to.t, index2, weights, work)?;
         self.widen();
+        self.inside.look_within(from, to, work);
         if self.is_quiet(network, from, to, &work.dense) {
             self.left.copy_from_slice(&self.row);
             return Ok(());

@@ -75,13 +75,15 @@ pub fn transient(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
-    /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order are the cheapest then.
+    /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order are the cheapest then,
+    /// and of those of linear equations the ones that are solved once.
     const PILOT: f64 = 1e-1;
     const COARSE: f64 = 1e-2;
     let needs_pilot = settings.tolerance == Tolerance::Scaled && settings.reltol < COARSE;
     let mut pilot = None;
     if needs_pilot {
-        let method = Method::TrBdf2;
+        let linear = system.is_linear();
+        let method = if linear { Method::Trapezoidal } else { Method::TrBdf2 };
         let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
         let mut run = Run::new(system, &coarse, None, None);
         match run.run() {
@@ -165,6 +167,8 @@ struct Run<'a> {
     /// Rates of index 2, and the largest of each so far.
     untested_rates: Vec<bool>,
     largest_rates: Vec<f64>,
+    /// The largest that each charge has been at a corner or event.
+    largest_charges: Vec<f64>,
     index2: bool,
     was_index2: bool,
     floors: Vec<f64>,
@@ -235,6 +239,7 @@ impl<'a> Run<'a> {
             untested: vec![false; n],
             untested_rates: vec![false; charges],
             largest_rates: vec![0.0; charges],
+            largest_charges: vec![0.0; charges],
             index2: false,
             was_index2: false,
             floors: op::floors(&network),
@@ -476,9 +481,9 @@ impl<'a> Run<'a> {
             outcome.map_err(|stopped| self.row_failure(stopped))?;
         }
         self.remember()?;
-        self.work.history.remember(&self.state);
         self.work.linearised = false;
         std::mem::swap(&mut self.state, &mut self.next);
+        self.work.history.take(&mut self.next);
         if self.watches {
             self.network.see_guards(&self.controls.right);
             std::mem::swap(&mut self.controls.left, &mut self.controls.right);

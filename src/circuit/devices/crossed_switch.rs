@@ -53,7 +53,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     if let Some(mode) = stamper.mode(id).and_then(|k| stamper.stamps.modes.get_mut(k as usize)) {
         // On within the band means that it came from below.
         let initial = initially_on.map(|on| !on);
-        *mode = Mode { device: id, control, on: *above, off: *below, initial };
+        *mode = Mode { device: id, control, on: *above, off: *below, initial, course: None };
     }
     let into = stamper.leaving(stamper.ends(id));
     stamper.add(id, current(stamper, id), into);

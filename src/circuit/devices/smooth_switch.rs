@@ -71,7 +71,7 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
         let turned = on < off;
         let control = if turned { control.negate() } else { control };
         let (on, off) = if turned { (-*on, -*off) } else { (*on, *off) };
-        *mode = Mode { device: id, control, on, off, initial: *initially_on };
+        *mode = Mode { device: id, control, on, off, initial: *initially_on, course: None };
     }
     let into = stamper.leaving(stamper.ends(id));
     stamper.add(id, current(stamper, id), into);

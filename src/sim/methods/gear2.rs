@@ -42,7 +42,7 @@ pub(crate) fn step(
     for (k, rate) in to.w.iter_mut().enumerate() {
         *rate = alpha * to.q[k] + beta[k];
     }
-    dense.hermite(history, from, to);
+    dense.follow_past();
     let away = missed.map_or(f64::INFINITY, |missed| {
         led_away(constant / (6.0 * missed + constant), x, &to.x, error);
         weighted(error, weights)

@@ -44,14 +44,14 @@ impl History {
         self.has_away = false;
     }
 
-    /// Takes the left end of an accepted step.
-    pub fn remember(&mut self, from: &State) {
+    /// Takes the left end of an accepted step, and leaves what is older in its place.
+    pub fn take(&mut self, from: &mut State) {
         self.times[1] = self.times[0];
         self.times[0] = from.t;
         self.x.swap(0, 1);
-        self.x[0].copy_from_slice(&from.x);
-        self.q.copy_from_slice(&from.q);
-        self.w.copy_from_slice(&from.w);
+        std::mem::swap(&mut self.x[0], &mut from.x);
+        std::mem::swap(&mut self.q, &mut from.q);
+        std::mem::swap(&mut self.w, &mut from.w);
         self.count = (self.count + 1).min(2);
     }
 
@@ -127,17 +127,29 @@ impl History {
         }
     }
 
-    /// k₁ of the parabolas through the point before, and the two ends of a step; 0 where there is no point before.
-    pub fn bend(&self, from: &State, to: &State, k: &mut [f64]) {
-        if self.count == 0 {
-            k.fill(0.0);
-            return;
-        }
-        let (h, last) = (to.t - from.t, from.t - self.times[0]);
-        let (a, b) = (h / (h + last), h * h / (last * (h + last)));
-        let points = to.x.iter().zip(&from.x).zip(&self.x[0]);
-        for (k, ((to, from), before)) in k.iter_mut().zip(points) {
-            *k = b * (from - before) - a * (to - from);
+    /// k₁ of the parabola of each unknown asked for through the point before, and the two ends of a step; 0 where there is
+    /// no point before.
+    pub fn bend(&self, from: &State, to: &State, k: &mut [f64], asked: Option<&[u32]>) {
+        let one = match self.count {
+            0 => (0.0, 0.0),
+            _ => {
+                let (h, last) = (to.t - from.t, from.t - self.times[0]);
+                (h / (h + last), h * h / (last * (h + last)))
+            }
+        };
+        let (a, b) = one;
+        let bend = |before: f64, from: f64, to: f64| b * (from - before) - a * (to - from);
+        let before = &self.x[0];
+        match asked {
+            Some(asked) => asked.iter().map(|i| *i as usize).for_each(|i| {
+                k[i] = bend(before[i], from.x[i], to.x[i]);
+            }),
+            None => {
+                let points = to.x.iter().zip(&from.x).zip(before);
+                for (k, ((to, from), before)) in k.iter_mut().zip(points) {
+                    *k = bend(*before, *from, *to);
+                }
+            }
         }
     }
 }

@@ -114,6 +114,17 @@ pub(crate) struct Dense {
     pub by_unknowns: bool,
     /// Whether unknowns between lie on parabolas through the point before: as exact as steps of second order are.
     pub by_past: bool,
+    /// So many of the k of the unknowns, and of the charges, may be other than 0.
+    degrees: [usize; 2],
+    /// Whether polynomials by the past are still to be made.
+    pending: bool,
+}
+
+/// What is asked of polynomials, where that is little.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Asked {
+    pub unknowns: Vec<u32>,
+    pub charges: Vec<u32>,
 }
 
 impl Dense {
@@ -123,40 +134,83 @@ impl Dense {
             q: std::array::from_fn(|_| vec![0.0; charges]),
             by_unknowns: false,
             by_past: false,
+            degrees: [0; 2],
+            pending: false,
         }
+    }
+
+    /// Polynomials of the fourth degree: rows of factors for each k, of increments of which one stands after another.
+    pub fn quartic(&mut self, rows: &[&[f64]; 3], ux: &[f64], uq: &[f64]) {
+        (self.by_unknowns, self.by_past, self.pending) = (false, false, false);
+        self.degrees = [3; 2];
+        for (k, row) in rows.iter().enumerate() {
+            for (sum, u) in [(&mut self.x[k], ux), (&mut self.q[k], uq)] {
+                sum.fill(0.0);
+                let size = sum.len();
+                for (factor, u) in row.iter().zip(u.chunks_exact(size.max(1))) {
+                    add(*factor, u, sum);
+                }
+            }
+        }
+    }
+
+    /// Makes 0 of all k of the unknowns, or of the charges, but so many.
+    fn keep(&mut self, of: usize, count: usize) {
+        let k = if of == 0 { &mut self.x } else { &mut self.q };
+        let end = self.degrees[of].max(count);
+        k[count..end].iter_mut().for_each(|k| k.fill(0.0));
+        self.degrees[of] = count;
+    }
+
+    /// Straight lines of the unknowns.
+    pub fn lines(&mut self) {
+        self.pending = false;
+        self.keep(0, 0);
     }
 
     /// Parabolas of the unknowns through their values at a part of the step; charges follow from them.
     pub fn parabolas(&mut self, theta: f64, from: &State, middle: &[f64], to: &State) {
-        (self.by_unknowns, self.by_past) = (true, false);
-        let [first, second, third] = &mut self.x;
-        for (i, k) in first.iter_mut().enumerate() {
-            let line = (1.0 - theta) * from.x[i] + theta * to.x[i];
-            *k = (middle[i] - line) / (theta * (1.0 - theta));
+        (self.by_unknowns, self.by_past, self.pending) = (true, false, false);
+        self.keep(0, 1);
+        let points = from.x.iter().zip(&to.x).zip(middle);
+        for (k, ((from, to), middle)) in self.x[0].iter_mut().zip(points) {
+            let line = (1.0 - theta) * from + theta * to;
+            *k = (middle - line) / (theta * (1.0 - theta));
         }
-        second.fill(0.0);
-        third.fill(0.0);
+    }
+
+    /// Polynomials by the past, made when they are asked for: see [`hermite`](Dense::hermite).
+    pub fn follow_past(&mut self) {
+        (self.by_unknowns, self.by_past, self.pending) = (false, true, true);
+        self.keep(1, 2);
+        self.keep(0, 1);
     }
 
     /// Cubic polynomials of the charges through their values and rates at both ends; parabolas of the unknowns through the
-    /// point before.
-    pub fn hermite(&mut self, history: &History, from: &State, to: &State) {
-        (self.by_unknowns, self.by_past) = (false, true);
+    /// point before. Of all, or of the unknowns and charges `asked` for.
+    fn hermite(&mut self, history: &History, from: &State, to: &State, asked: Option<&Asked>) {
         let h = to.t - from.t;
-        let [first, second, third] = &mut self.q;
-        let ends = from.q.iter().zip(&from.w).zip(to.q.iter().zip(&to.w));
-        for ((first, second), ((from, from_w), (to, to_w))) in
-            first.iter_mut().zip(second.iter_mut()).zip(ends)
-        {
+        let [first, second, _] = &mut self.q;
+        let cubic = |[from, to]: [f64; 2], [from_w, to_w]: [f64; 2]| {
             let change = to - from;
-            *first = h * from_w - change;
-            *second = 2.0 * change - h * (from_w + to_w);
+            (h * from_w - change, 2.0 * change - h * (from_w + to_w))
+        };
+        match asked {
+            Some(asked) => asked.charges.iter().map(|k| *k as usize).for_each(|k| {
+                (first[k], second[k]) = cubic([from.q[k], to.q[k]], [from.w[k], to.w[k]]);
+            }),
+            None => {
+                let ends = from.q.iter().zip(&to.q).zip(from.w.iter().zip(&to.w));
+                for ((first, second), ((from, to), (from_w, to_w))) in
+                    first.iter_mut().zip(second.iter_mut()).zip(ends)
+                {
+                    (*first, *second) = cubic([*from, *to], [*from_w, *to_w]);
+                }
+            }
         }
-        third.fill(0.0);
-        let [first, second, third] = &mut self.x;
-        history.bend(from, to, first);
-        second.fill(0.0);
-        third.fill(0.0);
+        let unknowns = asked.map(|asked| &asked.unknowns[..]);
+        history.bend(from, to, &mut self.x[0], unknowns);
+        self.pending = asked.is_some();
     }
 
     /// The unknowns at a part of the step.
@@ -177,6 +231,13 @@ impl Dense {
     /// The charges at a part of the step.
     pub fn charges(&self, theta: f64, from: &State, to: &State, out: &mut [f64]) {
         interpolate(theta, &from.q, &to.q, &self.q, out);
+    }
+}
+
+/// y += factor·x
+fn add(factor: f64, x: &[f64], y: &mut [f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += factor * x;
     }
 }
 
@@ -248,6 +309,13 @@ impl Work {
             unconfirmed: 0.0,
             history: History::new(n, charges),
             linearised: false,
+        }
+    }
+
+    /// Makes the polynomials of a step just taken, where they are still to be made: all of them, or those `asked` for.
+    pub fn complete(&mut self, from: &State, to: &State, asked: Option<&Asked>) {
+        if self.dense.pending {
+            self.dense.hermite(&self.history, from, to, asked);
         }
     }
 }

@@ -12,7 +12,7 @@
 //! W, ∂/∂t and q' are taken at the left end; the last stage's u is the error estimate. Coefficients in the form of
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 1996, IV.7.
 
-use super::{Work, weighted};
+use super::{Work, add, weighted};
 use crate::linear::Cause;
 use crate::sim::network::Network;
 use crate::sim::newton::Cut;
@@ -176,22 +176,7 @@ pub(crate) fn step(
         return Err(Cut::NonFinite { device: network.non_finite_law() });
     }
     if size <= 1.0 {
-        (dense.by_unknowns, dense.by_past) = (false, false);
-        for (k, row) in tableau.dense.iter().enumerate() {
-            dense.x[k].fill(0.0);
-            dense.q[k].fill(0.0);
-            for (j, factor) in row.iter().enumerate() {
-                add(*factor, &ux[j * n..(j + 1) * n], &mut dense.x[k]);
-                add(*factor, &uq[j * charges..(j + 1) * charges], &mut dense.q[k]);
-            }
-        }
+        dense.quartic(&tableau.dense, ux, uq);
     }
     Ok(size)
-}
-
-/// y += factor·x
-fn add(factor: f64, x: &[f64], y: &mut [f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += factor * x;
-    }
 }

@@ -28,9 +28,12 @@ pub(crate) fn step(
     let unconfirmed = work.unconfirmed;
     let Work { beta, sum, error, dense, scratch, history, x, .. } = work;
     let missed = history.predict(from, to.t, x);
-    to.x.copy_from_slice(x);
-    // Linear equations are solved from any guess.
-    let followed = missed.filter(|_| !network.system.is_linear());
+    // Linear equations are solved from no guess.
+    let guessed = !network.system.is_linear();
+    if guessed {
+        to.x.copy_from_slice(x);
+    }
+    let followed = missed.filter(|_| guessed);
     if let Some(missed) = followed {
         history.lead(missed, h, &mut to.x);
     }
@@ -43,7 +46,7 @@ pub(crate) fn step(
     for (rate, (q, beta)) in to.w.iter_mut().zip(to.q.iter().zip(beta.iter())) {
         *rate = alpha * q + beta;
     }
-    dense.hermite(history, from, to);
+    dense.follow_past();
     if let Some(missed) = followed {
         history.learn(missed, h, x, &to.x);
     }

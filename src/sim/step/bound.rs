@@ -21,6 +21,11 @@ const BOUND_AT_ONCE: u32 = 2;
 /// Each time it comes back the limit must bind this many times as long.
 const PATIENCE: u32 = 2;
 
+/// A limit of no more than this part of the run is likely to bind.
+const LIKELY: f64 = 0.01;
+/// Why the trapezoidal rule is taken.
+const BINDS: &str = "the step limit binds";
+
 /// What the last steps say of the limit.
 #[derive(Default)]
 pub(super) struct Bound {
@@ -35,6 +40,17 @@ pub(super) struct Bound {
 }
 
 impl Run<'_> {
+    /// Begins with the trapezoidal rule where the limit is likely to bind: linear equations change fast after corners alone.
+    pub(super) fn expect_limit(&mut self) {
+        let limit = self.settings.hmax.filter(|_| self.settings.method == Method::Auto);
+        let binds = limit.is_some_and(|limit| limit <= LIKELY * self.settings.stop);
+        let changes = matches!(self.method, Method::Rodas4 | Method::Rodas5p);
+        if binds && changes && self.network.system.is_linear() {
+            self.bound.left = Some(self.method);
+            self.go_on_with(Method::Trapezoidal, BINDS);
+        }
+    }
+
     /// Changes the method where the step limit says so, and back. Only one that nobody asked for is changed.
     pub(super) fn suit_limit(&mut self, error: f64, h: f64) {
         let limit = match self.settings.hmax {
@@ -52,7 +68,7 @@ impl Run<'_> {
                     let bound = &mut self.bound;
                     bound.left = Some(self.method);
                     (bound.bound, bound.struggles) = (0, 0);
-                    self.go_on_with(Method::Trapezoidal, "the step limit binds");
+                    self.go_on_with(Method::Trapezoidal, BINDS);
                 }
             }
             None if self.method == Method::TrBdf2 && !self.index2 => {

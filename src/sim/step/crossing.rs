@@ -66,6 +66,7 @@ impl Run<'_> {
         if !self.watches {
             return Located::Nothing;
         }
+        self.work.complete(&self.state, &self.next, None);
         let Run { network, next, controls, .. } = self;
         network.controls(&next.x, next.t, &mut controls.right);
         if let Some(mode) = search.mode {
@@ -317,7 +318,7 @@ impl Run<'_> {
         }
         network.controls(&next.x, next.t, &mut controls.right);
         // A refused step has no dense output: straight lines will do to see a jump.
-        work.dense.x.iter_mut().for_each(|k| k.fill(0.0));
+        work.dense.lines();
         let mut any = false;
         for mode in 0..self.network.system.modes.len() {
             let Run { network, controls, .. } = self;

@@ -10,6 +10,9 @@ const KINDS: usize = 16;
 /// Values and slopes of a source that differ by no more than this part of their size are the same.
 const SAME: f64 = 1e-6;
 
+/// The part of a charge by which it may change in a first step.
+const LITTLE: f64 = 0.01;
+
 /// What ends a stretch of steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -47,8 +50,12 @@ impl First {
         First { known: Vec::with_capacity(KINDS), ..First::default() }
     }
 
-    /// The corner that sources have just passed: the first of those whose segment begins there.
+    /// The corner that has just been passed: a mode over time that changed there, else the first of the sources whose segment
+    /// begins there.
     pub fn corner(&mut self, network: &Network, t: f64, slack: f64) {
+        if let Some((mode, value)) = network.struck {
+            return self.event(mode, value);
+        }
         let mut segments = network.segments.iter();
         let found = segments.position(|segment| (segment.start - t).abs() <= slack);
         self.present = found.map(|k| {
@@ -84,10 +91,28 @@ impl Run<'_> {
     /// ones had failed.
     pub(super) fn shorten(&mut self) {
         let span = self.distance();
-        let careful = 0.1 * span;
+        let careful = (0.1 * span).min(self.until_charges_change());
         let known = self.first.present.and_then(|place| self.first.known[place].1);
         let most = known.map_or(careful, |did| did.min(careful));
         self.h = (0.5 * self.h).min(most).max(self.smallest);
+    }
+
+    /// Where there are junctions, the time in which rates change a charge by a small part of the largest it has been at a
+    /// corner or event (E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, 1993, II.4). What begins to conduct within a
+    /// step shows at neither of its stages.
+    fn until_charges_change(&mut self) -> f64 {
+        let Run { state, network, largest_charges, .. } = self;
+        if !network.system.has_junctions() {
+            return f64::INFINITY;
+        }
+        let mut fastest: f64 = 0.0;
+        for ((largest, q), w) in largest_charges.iter_mut().zip(&state.q).zip(&state.w) {
+            *largest = largest.max(q.abs());
+            if *largest > 0.0 {
+                fastest = fastest.max(w.abs() / *largest);
+            }
+        }
+        LITTLE / fastest
     }
 
     /// The first step after a corner or event says how long the next one of its kind may be.

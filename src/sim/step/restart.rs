@@ -79,6 +79,7 @@ impl Run<'_> {
         self.method = method;
         self.home = method;
         count_system(&mut self.network, method.name(), reason);
+        self.expect_limit();
         let span = self.distance();
         self.h = self.settings.h0.unwrap_or(1e-3 * span).min(span);
         self.rows_first()?;
@@ -290,9 +291,16 @@ impl Run<'_> {
 
     /// Takes the values at the end of a step into the weights, which seldom changes any.
     pub(super) fn weigh_step(&mut self) {
-        let grows = self.largest.iter().zip(&self.state.x).any(|(most, x)| x.abs() > *most);
-        if grows || self.index2 || self.was_index2 {
-            self.weigh();
+        if self.index2 || self.was_index2 {
+            return self.weigh();
+        }
+        let Run { state, largest, weights, absolute, rounding, settings, .. } = self;
+        for (k, (largest, x)) in largest.iter_mut().zip(&state.x).enumerate() {
+            if x.abs() > *largest {
+                *largest = x.abs();
+                let weight = settings.reltol * *largest + absolute[k];
+                weights[k] = weight.max(rounding.floors()[k]).max(f64::MIN_POSITIVE);
+            }
         }
     }
 
