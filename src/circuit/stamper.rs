@@ -121,7 +121,14 @@ impl<'a> Stamper<'a> {
             if needs.mode {
                 slot.mode = Index(stamps.modes.len() as u32);
                 let control = Law::number(0.0);
-                stamps.modes.push(Mode { device: id, control, on: 0.0, off: 0.0, initial: None, course: None });
+                stamps.modes.push(Mode {
+                    device: id,
+                    control,
+                    on: 0.0,
+                    off: 0.0,
+                    initial: None,
+                    course: None,
+                });
             }
         }
         stamps.nodes = stamps.unknowns.len();

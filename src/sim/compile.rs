@@ -12,9 +12,9 @@ use super::sparse::Rows;
 use super::structure;
 use super::system::{Guard, LawGroup, ModeData, Source, System, Target};
 use crate::circuit::DeviceId;
-use crate::circuit::stamps::{Law, Leaf, Stamps, Unknown};
+use crate::circuit::stamps::{Junction, Law, Leaf, Stamps, Unknown};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{Dag, Node, NodeId};
+use crate::expr::{Dag, Node, NodeId, Unary};
 use crate::source::Span;
 use std::collections::BTreeMap;
 
@@ -76,6 +76,12 @@ fn compile_for(stamps: &Stamps, linear: bool, d: &mut Vec<Diagnostic>) -> Option
     }
 }
 
+/// The input that time is: past every unknown that may yet be added, one for each charge at most, so that laws keep their
+/// numbers while rates become unknowns; and past the voltage of a junction.
+fn time_input(stamps: &Stamps) -> usize {
+    stamps.unknowns.len() + stamps.charges.len() + 1
+}
+
 struct Builder<'a> {
     stamps: &'a Stamps,
     /// Output columns and what is delayed have derivatives.
@@ -96,7 +102,7 @@ struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     fn new(stamps: &'a Stamps) -> Builder<'a> {
-        let time = (stamps.unknowns.len() + stamps.charges.len()) as u32;
+        let time = time_input(stamps) as u32;
         let mut builder = Builder {
             conditions: Conditions::new(time, time + 1 + stamps.modes.len() as u32),
             stamps,
@@ -124,10 +130,8 @@ impl<'a> Builder<'a> {
         builder
     }
 
-    /// The input that time is: past every unknown that may yet be added, one for each charge at most, so that laws keep
-    /// their numbers while rates become unknowns.
     fn time_input(&self) -> usize {
-        self.stamps.unknowns.len() + self.stamps.charges.len()
+        time_input(self.stamps)
     }
 
     fn add_rate(&mut self, k: u32) {
@@ -169,11 +173,34 @@ impl<'a> Builder<'a> {
         self.stamps.modes.len() + SLOTS as usize * self.conditions.list.len()
     }
 
-    /// Adds a law to the graph of its group, its conditions as modes.
-    fn add(&mut self, dag: &mut Dag, law: &Law, device: DeviceId) -> NodeId {
+    /// Adds a law to the graph of its group: one of a junction as a function of its voltage, in which regions join smoothly;
+    /// of others conditions become modes.
+    fn add(&mut self, group: &mut Group, law: &Law, device: DeviceId) -> NodeId {
+        let dag = &mut group.dag;
+        if let Some(junction) = &group.junction {
+            return self.add_of_voltage(dag, law, junction);
+        }
         let mut conditions = std::mem::take(&mut self.conditions);
         let node = conditions.add(dag, law, device, &|leaf| self.input(leaf, None));
         self.conditions = conditions;
+        node
+    }
+
+    /// Adds a law that speaks of nothing but the voltage across a junction.
+    fn add_of_voltage(&self, dag: &mut Dag, law: &Law, junction: &Junction) -> NodeId {
+        let [anode, cathode] = junction.across;
+        let added: Result<NodeId, std::convert::Infallible> = dag.add(law, &mut |dag, leaf, _| {
+            let voltage = dag.input(self.time_input() as u32 - 1);
+            Ok(match leaf {
+                Leaf::Unknown(k) if Some(*k) == anode => voltage,
+                Leaf::Unknown(k) if Some(*k) == cathode && anode.is_none() => {
+                    dag.unary(Unary::Negate, voltage)
+                }
+                Leaf::Unknown(k) if Some(*k) == cathode => dag.constant(0.0),
+                other => dag.input(self.input(other, None)),
+            })
+        });
+        let Ok(node) = added;
         node
     }
 
@@ -194,7 +221,7 @@ impl<'a> Builder<'a> {
         for stamp in &stamps.laws {
             let into: Vec<(u32, f64)> = stamp.into.iter().map(|(row, f)| (row.0, *f)).collect();
             let group = junctions.get_mut(&stamp.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.dag, &stamp.law, stamp.device);
+            let node = self.add(group, &stamp.law, stamp.device);
             match group.dag.affine(node) {
                 Some((constant, factors)) if factors.iter().all(|(input, _)| *input < n) => {
                     for (row, factor) in into {
@@ -216,7 +243,7 @@ impl<'a> Builder<'a> {
         for (k, charge) in stamps.charges.iter().enumerate() {
             let Some(law) = &charge.law else { continue };
             let group = junctions.get_mut(&charge.device.0).unwrap_or(&mut plain);
-            let node = self.add(&mut group.dag, law, charge.device);
+            let node = self.add(group, law, charge.device);
             match group.dag.affine(node) {
                 // A constant part of a charge has no rate, but it belongs to the initial value: keep such a law.
                 Some((constant, factors))
@@ -328,7 +355,12 @@ impl<'a> Builder<'a> {
             let nodes: Vec<NodeId> = laws.iter().map(|law| law.node).collect();
             groups.push(LawGroup {
                 modal,
-                laws: LawSet::new(&mut dag, &nodes, time as u32 + 1),
+                laws: match &junction {
+                    Some(junction) => {
+                        LawSet::of_junction(&mut dag, &nodes, time as u32 - 1, junction)
+                    }
+                    None => LawSet::new(&mut dag, &nodes, time as u32 + 1),
+                },
                 devices: laws.iter().map(|law| law.device).collect(),
                 targets: laws.into_iter().map(|law| law.target).collect(),
                 dynamic: vec![],

@@ -3,7 +3,7 @@
 use super::system::Target;
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::Junction;
-use crate::expr::{Dag, NodeId, Program};
+use crate::expr::{Dag, NodeId, Program, Unary};
 
 /// A law on its way into a group.
 pub(crate) struct Placed {
@@ -71,6 +71,30 @@ impl LawSet {
                     set.inputs.push(input);
                     outputs.push(derivative);
                 }
+            }
+            set.starts.push(set.inputs.len() as u32);
+        }
+        set.values = Program::compile(dag, laws);
+        set.full = Program::compile(dag, &outputs);
+        set
+    }
+
+    /// Compiles values and derivatives of laws over the voltage of a junction, which is `voltage` among the inputs: those by
+    /// its two ends differ in sign.
+    pub fn of_junction(
+        dag: &mut Dag,
+        laws: &[NodeId],
+        voltage: u32,
+        junction: &Junction,
+    ) -> LawSet {
+        let mut outputs = laws.to_vec();
+        let mut set = LawSet { starts: vec![0], ..LawSet::default() };
+        for law in laws {
+            let slope = dag.derivative(*law, voltage);
+            for (end, unknown) in junction.across.iter().enumerate() {
+                let Some(unknown) = unknown else { continue };
+                set.inputs.push(unknown.0);
+                outputs.push(if end == 0 { slope } else { dag.unary(Unary::Negate, slope) });
             }
             set.starts.push(set.inputs.len() as u32);
         }

@@ -216,10 +216,14 @@ impl<'a> Network<'a> {
         self.statistics.evaluations += 1;
         self.set_inputs(x, t);
         for (state, group) in self.groups.iter_mut().zip(&self.system.groups) {
-            match group.modal {
-                true => state.follow(&group.laws, &mut self.inputs),
-                false => group.laws.values(&self.inputs, &mut state.registers, &mut state.values),
+            if group.modal {
+                state.follow(&group.laws, &mut self.inputs);
+                continue;
             }
+            if let Some(junction) = &group.junction {
+                self.inputs[self.system.voltage_input()] = voltage_across(junction, |k| x[k]);
+            }
+            group.laws.values(&self.inputs, &mut state.registers, &mut state.values);
         }
     }
 
@@ -255,24 +259,16 @@ impl<'a> Network<'a> {
                 voltage
             };
             state.voltage = allowed;
-            let moved = allowed - voltage;
-            let (input, change) = match junction.across {
-                [Some(anode), _] => (anode.0 as usize, moved),
-                [None, Some(cathode)] => (cathode.0 as usize, -moved),
-                [None, None] => (0, 0.0),
-            };
-            let kept = self.inputs[input];
-            self.inputs[input] = kept + change;
+            self.inputs[self.system.voltage_input()] = allowed;
             laws.full(&self.inputs, &mut state.registers, &mut state.values, &mut state.partials);
-            self.inputs[input] = kept;
-            if change != 0.0 {
+            let moved = allowed - voltage;
+            if moved != 0.0 {
                 limited = true;
+                let sign = if junction.across[0].is_some() { 1.0 } else { -1.0 };
                 for (o, value) in state.values.iter_mut().enumerate() {
-                    for p in laws.row(o) {
-                        if laws.input(p) == input {
-                            *value -= state.partials[p] * change;
-                        }
-                    }
+                    // The first is by the anode, where that is an unknown.
+                    let slope = laws.row(o).next().map_or(0.0, |p| sign * state.partials[p]);
+                    *value -= slope * moved;
                 }
             }
         }

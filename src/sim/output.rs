@@ -25,6 +25,9 @@ const MEASURED: f64 = 0.1;
 /// at its bend.
 const STRAIGHT: f64 = 0.75;
 
+/// Of a parabola's piece each half is off by a fourth of what that is: by about as much.
+const REGULAR: std::ops::Range<f64> = 3.0..5.5;
+
 /// A step within which a column moves by less than this part of what it may be off a line is not asked.
 const QUIET: f64 = 0.25;
 
@@ -268,7 +271,8 @@ impl<'a> Rows<'a> {
                     if theta == 0.5 {
                         self.middle.copy_from_slice(&self.row);
                     }
-                    if off > STRAIGHT {
+                    // What halves as a parabola does is one.
+                    if off > STRAIGHT || REGULAR.contains(&(before / off)) {
                         break;
                     }
                 }

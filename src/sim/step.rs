@@ -28,6 +28,7 @@ use super::settings::{Settings, Side, Tolerance};
 use super::statistics::Statistics;
 use super::system::System;
 use crate::circuit::Waveform;
+use crate::circuit::stamps::Unknown;
 use crate::trace::Sink;
 
 /// Values of an operating point.
@@ -75,17 +76,21 @@ pub fn transient(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
-    /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order are the cheapest then,
-    /// and of those of linear equations the ones that are solved once.
+    /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order, and with few solutions,
+    /// are the cheapest then.
     const PILOT: f64 = 1e-1;
     const COARSE: f64 = 1e-2;
     let needs_pilot = settings.tolerance == Tolerance::Scaled && settings.reltol < COARSE;
     let mut pilot = None;
     if needs_pilot {
-        let linear = system.is_linear();
-        let method = if linear { Method::Trapezoidal } else { Method::TrBdf2 };
+        let method = match (system.is_linear(), system.has_junctions()) {
+            (true, _) => Method::Trapezoidal,
+            (_, true) => Method::TrBdf2,
+            _ => Method::Rodas3,
+        };
         let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
         let mut run = Run::new(system, &coarse, None, None);
+        run.enough = enough(system, settings);
         match run.run() {
             Ok(()) => {
                 let Network { statistics, tracks, orders, .. } = run.network;
@@ -109,6 +114,16 @@ pub fn transient(
     Ok(run.network.statistics)
 }
 
+/// Magnitudes beyond which floors follow no longer.
+fn enough(system: &System, settings: &Settings) -> Vec<f64> {
+    let of = |unknown: &Unknown| {
+        let literal = if unknown.voltage { settings.vntol } else { settings.abstol };
+        let nominal = unknown.nominal.filter(|nominal| *nominal > 0.0);
+        nominal.unwrap_or(literal / (SMALL_PART * settings.reltol))
+    };
+    system.unknowns.iter().map(of).collect()
+}
+
 /// Gives sources their DC values, where they have one beside what they are over time.
 pub(super) fn set_to_dc(network: &mut Network) {
     for (segment, source) in network.segments.iter_mut().zip(&network.system.sources) {
@@ -127,6 +142,9 @@ fn count_system(network: &mut Network, method: &str, reason: &str) {
     statistics.charges = system.charges();
     statistics.entries = system.dynamic.pattern.len();
 }
+
+/// What an unknown is off where it is small is no more than this part of what it may be off at its largest.
+const SMALL_PART: f64 = 1e-3;
 
 /// A pilot pass ends after so many steps: what magnitudes it has seen until then will do.
 const PILOT_STEPS: u64 = 1000;
@@ -157,6 +175,8 @@ struct Run<'a> {
     /// Room for values within a step, for delays.
     inside: Inside,
     method: Method,
+    /// Of a pilot pass the magnitudes that will do.
+    enough: Vec<f64>,
     /// a_i, m_i and a_i + reltol·m_i (infinite where an unknown is not tested).
     absolute: Vec<f64>,
     largest: Vec<f64>,
@@ -223,7 +243,7 @@ impl<'a> Run<'a> {
                     settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
                 }
                 (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
-                    literal.min(1e-3 * settings.reltol * size)
+                    literal.min(SMALL_PART * settings.reltol * size)
                 }
                 _ => literal,
             }
@@ -232,6 +252,7 @@ impl<'a> Run<'a> {
             inside: Inside::new(&network),
             rows,
             method: settings.method,
+            enough: vec![],
             absolute: absolute.collect(),
             largest: vec![0.0; n],
             weights: vec![0.0; n],
@@ -271,7 +292,7 @@ impl<'a> Run<'a> {
     fn run(&mut self) -> Result<(), Failure> {
         self.start()?;
         while self.state.t < self.settings.stop - self.smallest {
-            if self.rows.is_none() && self.network.statistics.accepted >= PILOT_STEPS {
+            if self.rows.is_none() && self.has_seen_enough() {
                 return Ok(());
             }
             self.check_interrupt()?;
@@ -288,6 +309,13 @@ impl<'a> Run<'a> {
             self.rows_at_state()?;
         }
         Ok(())
+    }
+
+    /// Whether a pilot pass may end: nothing that it is asked for changes any more, or it has been long.
+    fn has_seen_enough(&self) -> bool {
+        let known = || self.largest.iter().zip(&self.enough).all(|(most, enough)| most >= enough);
+        // The ranges of guards are asked for, too.
+        self.network.statistics.accepted >= PILOT_STEPS || (!self.watches && known())
     }
 
     /// Time to the next corner or the end.
@@ -433,8 +461,7 @@ impl<'a> Run<'a> {
 
     /// Whether a Rosenbrock method stands where a law's derivative by time is infinite.
     fn slope_by_time_is_infinite(&self) -> bool {
-        matches!(self.method, Method::Rodas4 | Method::Rodas5p)
-            && self.work.slopes.iter().any(|slope| !slope.is_finite())
+        self.method.is_rosenbrock() && self.work.slopes.iter().any(|slope| !slope.is_finite())
     }
 
     fn worst_error(&self) -> usize {

@@ -131,7 +131,8 @@ pub struct System {
     /// What its parts are called in the text that it was made of.
     pub spoken: crate::circuit::Spoken,
     pub(crate) charge_devices: Vec<DeviceId>,
-    /// Which input of the programs time is; unknowns stand before it, modes and rates behind it.
+    /// Which input of the programs time is; unknowns and the voltage of a junction stand before it, modes and rates behind
+    /// it.
     pub(crate) time_input: usize,
     pub(crate) conductances: Rows,
     /// Constant terms on the right-hand side.
@@ -238,6 +239,11 @@ impl System {
     /// A device's place.
     pub fn device_span(&self, id: DeviceId) -> Span {
         self.devices.get(id.0 as usize).map_or(Span::NONE, |device| device.span)
+    }
+
+    /// The input that the voltage of the junction is whose laws are evaluated.
+    pub(crate) fn voltage_input(&self) -> usize {
+        self.time_input - 1
     }
 
     /// Number of inputs of the programs: unknowns (with room up to `time_input`), time, modes, rates.

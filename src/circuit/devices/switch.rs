@@ -55,7 +55,8 @@ fn stamp(stamper: &mut Stamper, id: DeviceId) {
     }
     let control = stamper.law(control);
     if let Some(mode) = stamper.mode(id).and_then(|k| stamper.stamps.modes.get_mut(k as usize)) {
-        *mode = Mode { device: id, control, on: *on, off: *off, initial: *initially_on, course: None };
+        *mode =
+            Mode { device: id, control, on: *on, off: *off, initial: *initially_on, course: None };
     }
     let into = stamper.leaving(stamper.ends(id));
     stamper.add(id, current(stamper, id), into);

@@ -26,6 +26,8 @@ pub enum Method {
     Trapezoidal,
     /// BDF2 with variable steps, order 2.
     Gear2,
+    /// Rosenbrock, order 3, with straight lines between the ends of its steps: of pilot passes.
+    Rodas3,
 }
 
 /// One row of [`METHODS`].
@@ -75,6 +77,11 @@ impl Method {
             Method::Rodas4 => 4.0,
             _ => 3.0,
         }
+    }
+
+    /// Whether it takes the derivatives at a step's left end for all of it.
+    pub(crate) fn is_rosenbrock(self) -> bool {
+        matches!(self, Method::Rodas3 | Method::Rodas4 | Method::Rodas5p)
     }
 }
 
@@ -330,6 +337,7 @@ pub(crate) fn step(
     work: &mut Work,
 ) -> Result<f64, Cut> {
     match method {
+        Method::Rodas3 => rodas::step(&rodas::RODAS3, network, from, to, weights, work),
         Method::Rodas4 => rodas::step(&rodas::RODAS4P, network, from, to, weights, work),
         Method::Rodas5p => rodas::step(&rodas::RODAS5P, network, from, to, weights, work),
         Method::Trapezoidal => trapezoidal::step(network, from, to, weights, work),

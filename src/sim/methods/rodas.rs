@@ -1,4 +1,4 @@
-//! Rosenbrock methods that are stiffly accurate, of order 4 (Rodas4P) and 5 (Rodas5P), for equations of index 1.
+//! Rosenbrock methods that are stiffly accurate, of order 3 (Rodas3), 4 (Rodas4P) and 5 (Rodas5P), for equations of index 1.
 //!
 //! With the charges Q as differential unknowns, Q' = w, 0 = Q(x) − Q and 0 = G·x + f + A·w − b form a system of index 1
 //! in (Q; x, w). In each stage the increments of Q and w are eliminated by hand, so that the matrix stays n × n, w never
@@ -32,6 +32,19 @@ pub(crate) struct Tableau {
     /// Rows for k₁, k₂, k₃ of the dense output.
     pub dense: [&'static [f64]; 3],
 }
+
+/// A. Sandu et al., Benchmarking stiff ODE solvers for atmospheric chemistry problems II, Atmos. Environ. 31:3459-3472,
+/// 1997: order 3, estimate of order 2. Straight lines between its ends.
+#[rustfmt::skip]
+pub(crate) const RODAS3: Tableau = Tableau {
+    stages: 4,
+    gamma: 0.5,
+    a: &[&[0.0], &[2.0, 0.0]],
+    c: &[&[4.0], &[1.0, -1.0], &[1.0, -1.0, -8.0 / 3.0]],
+    at: &[0.0, 0.0],
+    d: &[0.5, 1.5],
+    dense: [&[], &[], &[]],
+};
 
 /// G. Steinebach, Order-reduction of ROW-methods for DAEs and method of lines applications, Preprint 1741, TH
 /// Darmstadt, 1995: order 4 (also on Prothero and Robinson's problem), estimate of order 3.

@@ -73,7 +73,7 @@ impl Run<'_> {
         let (method, reason) = methods::choose(&self.network, self.index2);
         let (method, reason) = match self.settings.method {
             Method::Auto => (method, reason),
-            Method::Rodas4 | Method::Rodas5p if self.index2 => (method, reason),
+            asked if asked.is_rosenbrock() && self.index2 => (method, reason),
             asked => (asked, "asked for"),
         };
         self.method = method;
@@ -116,7 +116,7 @@ impl Run<'_> {
                 self.leave_untested(&singular);
                 self.look_about();
                 self.detour = 0;
-                if matches!(self.method, Method::Rodas4 | Method::Rodas5p) {
+                if self.method.is_rosenbrock() {
                     self.method = Method::TrBdf2;
                     self.network.statistics.method = Method::TrBdf2.name().into();
                     self.network.statistics.reason =

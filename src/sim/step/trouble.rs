@@ -66,7 +66,7 @@ impl Run<'_> {
     /// Where a Rosenbrock method finds no way, since a law has a kink, no slope or an infinite one where the step begins,
     /// TR-BDF2 takes the next steps: it asks for the laws where the step ends. Says whether it can be tried.
     pub(super) fn take_detour(&mut self) -> bool {
-        if !matches!(self.method, Method::Rodas4 | Method::Rodas5p) {
+        if !self.method.is_rosenbrock() {
             return false;
         }
         self.home = self.method;
@@ -82,8 +82,9 @@ impl Run<'_> {
     /// end, and only the values there are tested. The equations are asked at the middle of the dense output, as far as
     /// their misfit moves what storages hold.
     pub(super) fn loses_its_way(&mut self) -> bool {
-        /// Dense output is of lower order than the step: only gross errors count.
-        const GROSS: f64 = 50.0;
+        /// Dense output is of lower order than the step, and yet misses by a tenth of what a step may err at most, unless
+        /// something bends within.
+        const MOST: f64 = 0.5;
         let rosenbrock = matches!(self.method, Method::Rodas4 | Method::Rodas5p);
         if !rosenbrock || self.stored.is_empty() || self.network.system.is_linear() {
             return false;
@@ -103,7 +104,7 @@ impl Run<'_> {
         let lost = |k: &u32| {
             let k = *k as usize;
             let size = work.right[k].abs();
-            size.is_nan() || size > GROSS * weights[k]
+            size.is_nan() || size > MOST * weights[k]
         };
         stored.iter().any(lost)
     }
