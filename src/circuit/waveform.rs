@@ -313,6 +313,14 @@ impl Segment {
         matches!(self.shape, Shape::Line { .. })
     }
 
+    /// The value where it does not change.
+    pub fn unchanging(&self) -> Option<f64> {
+        match self.shape {
+            Shape::Line { y0, y1, .. } if y0 == y1 => Some(y0),
+            _ => None,
+        }
+    }
+
     /// The value at `t`.
     pub fn value(&self, t: f64) -> f64 {
         match self.shape {

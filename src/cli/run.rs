@@ -92,9 +92,19 @@ pub fn prepare_with(
         circuit.steps = steps;
     }
     complete(&mut circuit, d);
-    let mut run = ready(circuit, &deck.units, false, pick, d)?;
-    run.deck = Some(deck);
+    // Other values than these are asked for by steps, and by analyses that are not over time.
+    let varies = !circuit.steps.is_empty() || !is_over_time(pick, &circuit);
+    let units = deck.units.clone();
+    let deck = varies.then_some(deck);
+    let mut run = ready(circuit, &units, false, pick, d)?;
+    run.deck = deck;
     Some(run)
+}
+
+/// Whether it is run over time, and nothing else is asked of that.
+fn is_over_time(pick: Option<&str>, circuit: &Circuit) -> bool {
+    let last = circuit.analyses.last();
+    pick.map_or_else(|| matches!(last, Some(Analysis::Transient { .. })), |name| name == "tran")
 }
 
 /// That nothing says until when to simulate.
@@ -122,7 +132,7 @@ fn unknown(name: &str) -> Diagnostic {
 
 /// Makes a circuit ready to run. `native`: it comes from a bond graph.
 pub fn ready(
-    circuit: Circuit,
+    mut circuit: Circuit,
     units: &Units,
     native: bool,
     pick: Option<&str>,
@@ -170,6 +180,10 @@ pub fn ready(
         d.push(Diagnostic::error("E0806", Span::NONE, message).help(format!("add `{card}`")));
         return None;
     };
+    if circuit.steps.is_empty() && matches!(analysis, Analysis::Transient { .. }) {
+        // All that follows is made of the stamps: of a large circuit the devices take as much memory as the run.
+        circuit.devices = vec![];
+    }
     let system = compiled(&analysis, &stamps, d)?;
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));

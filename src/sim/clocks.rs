@@ -198,3 +198,67 @@ fn next_switched(course: &Course, [on, off]: [f64; 2], t: f64, value: f64, stop:
     }
     at
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circuit::Waveform;
+
+    fn pulse(rise: f64, fall: f64) -> Waveform {
+        let (low, high, delay, width, period) = (0.0, 5.0, 1.0, 2.0, 8.0);
+        Waveform::Pulse { low, high, delay, rise, fall, width, period }
+    }
+
+    /// The changes up to `stop`: times, and values from then on.
+    fn changes(terms: Vec<(f64, Waveform)>, [on, off]: [f64; 2], stop: f64) -> Vec<(f64, f64)> {
+        let clock = Clock::of_switch(Course { constant: 0.0, terms }, on, off);
+        let mut value = clock.value(0.0, 0.0, &[], stop);
+        let (mut t, mut found) = (0.0, vec![]);
+        loop {
+            t = clock.next(t, value, &[], stop);
+            if t >= stop {
+                return found;
+            }
+            let after = clock.value(t, value, &[], stop);
+            if after != value {
+                found.push((t, after));
+            }
+            value = after;
+        }
+    }
+
+    #[test]
+    fn a_switch_changes_where_its_course_crosses_each_threshold() {
+        // 2.6 of 5 is reached after 0.52 of the rise, 2.4 after 0.52 of the fall.
+        let found = changes(vec![(1.0, pulse(1.0, 1.0))], [2.6, 2.4], 16.0);
+        let expected = [(1.52, 1.0), (4.52, 0.0), (9.52, 1.0), (12.52, 0.0)];
+        assert_eq!(found.len(), expected.len());
+        for ((t, value), (expected, state)) in found.into_iter().zip(expected) {
+            assert!((t - expected).abs() < 1e-14 && value == state, "{t} for {expected}");
+        }
+    }
+
+    #[test]
+    fn jumps_change_it_at_once_and_what_stays_between_the_thresholds_does_not() {
+        assert_eq!(
+            changes(vec![(1.0, pulse(0.0, 0.0))], [2.6, 2.4], 8.0),
+            [(1.0, 1.0), (3.0, 0.0)]
+        );
+        assert_eq!(changes(vec![(0.5, pulse(1.0, 1.0))], [2.6, 2.4], 80.0), []);
+        // The fall ends at the lower threshold: that is not past it.
+        let saw = Waveform::Pwl(vec![(0.0, 0.0), (1.0, 4.0), (2.0, 2.0), (3.0, 4.0), (4.0, 1.0)]);
+        let found = changes(vec![(1.0, saw)], [3.0, 2.0], 5.0);
+        assert_eq!(found.iter().map(|(_, value)| *value).collect::<Vec<_>>(), [1.0, 0.0]);
+        assert!((found[1].0 - (3.0 + 2.0 / 3.0)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_sum_of_sources_has_the_corners_of_all() {
+        let ramp = Waveform::Pwl(vec![(0.0, 0.0), (8.0, -2.0)]);
+        let found = changes(vec![(1.0, pulse(1.0, 1.0)), (1.0, ramp)], [2.5, 2.5], 8.0);
+        // 5·(t − 1) − t/4 = 2.5 and 5 − 5·(t − 4) − t/4 = 2.5
+        let expected = [7.5 / 4.75, 22.5 / 5.25];
+        assert_eq!(found.len(), 2);
+        assert!(found.iter().zip(expected).all(|((t, _), at)| (t - at).abs() < 1e-14), "{found:?}");
+    }
+}

@@ -58,8 +58,8 @@ pub(super) fn dc(job: &Job, sink: &mut dyn Sink) -> Result<Statistics, Failure> 
                 break;
             }
             for (source, value) in sources.iter().zip(&values) {
-                if let Some(segment) = source.and_then(|at| network.segments.get_mut(at)) {
-                    *segment = Waveform::Constant(*value).segment(0.0);
+                if let Some(at) = source {
+                    network.set_segment(*at, Waveform::Constant(*value).segment(0.0));
                 }
             }
             network.forget_constant_factors();

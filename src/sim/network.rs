@@ -80,7 +80,10 @@ impl Stages {
 pub(crate) struct Network<'a> {
     pub system: &'a System,
     /// The segment that each source is on.
-    pub segments: Vec<Segment>,
+    segments: Vec<Segment>,
+    /// −b without what moves: memories, and sources whose segments change, which are these.
+    rest: Vec<f64>,
+    moving: Vec<u32>,
     /// Modes, and the hold and slope of each condition, by their slots.
     pub modes: Vec<f64>,
     /// What is known of each mode's guard.
@@ -94,7 +97,7 @@ pub(crate) struct Network<'a> {
     /// The values that this conductance leads to, one for each unknown; mostly 0.
     pub anchor: Vec<f64>,
     /// Factor of all sources, while an operating point is sought; otherwise 1.
-    pub drive: f64,
+    drive: f64,
     /// Nodes that are pinned to values, while an operating point is sought: those of `.ic`, at first those of `.nodeset` too.
     pub pins: Vec<(u32, f64)>,
     pub statistics: Statistics,
@@ -135,8 +138,10 @@ impl<'a> Network<'a> {
                 moved: vec![0.0; if group.modal { group.laws.partials() } else { 0 }],
             })
             .collect();
-        Network {
+        let mut network = Network {
             system,
+            rest: vec![0.0; system.equations()],
+            moving: Vec::with_capacity(system.sources.len()),
             segments: system.sources.iter().map(|s| s.waveform.segment(t)).collect(),
             modes: vec![0.0; system.mode_slots],
             tracks: vec![Track::default(); system.modes.len()],
@@ -157,7 +162,14 @@ impl<'a> Network<'a> {
             frozen: Matrix::default(),
             orders: Orders::default(),
             factored_held: vec![],
-        }
+        };
+        network.see_drives();
+        network
+    }
+
+    /// The segment that each source is on.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
     }
 
     /// The next corner of any source, or change of a condition over time; infinite when there is none.
@@ -175,6 +187,9 @@ impl<'a> Network<'a> {
                 *segment = source.waveform.segment(segment.end);
                 corner = true;
             }
+        }
+        if corner {
+            self.see_drives();
         }
         let events = self.statistics.events;
         self.struck = None;
@@ -312,21 +327,49 @@ impl<'a> Network<'a> {
 
     /// r = f − b of linear equations where all unknowns are 0, after a linearisation.
     pub fn residual_at_zero(&self, t: f64, r: &mut [f64]) {
-        r.fill(0.0);
-        self.subtract_drives(t, r);
+        self.begin_residual(t, r);
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
             add_to_equations(&state.constants, &group.targets, r);
         }
     }
 
-    /// r −= b
-    fn subtract_drives(&self, t: f64, r: &mut [f64]) {
-        for (row, value) in &self.system.constants {
-            r[*row as usize] -= self.drive * value;
+    /// Sets a source's segment.
+    pub fn set_segment(&mut self, source: usize, segment: Segment) {
+        self.segments[source] = segment;
+        self.see_drives();
+    }
+
+    /// Sets the factor of all sources.
+    pub fn set_drive(&mut self, drive: f64) {
+        self.drive = drive;
+        self.see_drives();
+    }
+
+    /// Adds up what of b does not change before the next corner, and notes which sources do.
+    fn see_drives(&mut self) {
+        let Network { system, segments, drive, rest, moving, .. } = self;
+        rest.fill(0.0);
+        for (row, value) in &system.constants {
+            rest[*row as usize] -= *drive * value;
         }
-        for (segment, source) in self.segments.iter().zip(&self.system.sources) {
-            let value = self.drive * segment.value(t);
+        moving.clear();
+        for (k, (segment, source)) in segments.iter().zip(&system.sources).enumerate() {
+            let Some(value) = segment.unchanging() else {
+                moving.push(k as u32);
+                continue;
+            };
             for (row, factor) in &source.into {
+                rest[*row as usize] -= factor * *drive * value;
+            }
+        }
+    }
+
+    /// r = −b
+    fn begin_residual(&self, t: f64, r: &mut [f64]) {
+        r.copy_from_slice(&self.rest);
+        for k in self.moving.iter().map(|k| *k as usize) {
+            let value = self.drive * self.segments[k].value(t);
+            for (row, factor) in &self.system.sources[k].into {
                 r[*row as usize] -= factor * value;
             }
         }
@@ -340,9 +383,8 @@ impl<'a> Network<'a> {
 
     /// r = G·x + f − b, with the laws' values of the last evaluation.
     pub fn residual(&self, x: &[f64], t: f64, r: &mut [f64]) {
-        r.fill(0.0);
+        self.begin_residual(t, r);
         self.system.conductances.add_product(1.0, x, r);
-        self.subtract_drives(t, r);
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
             add_to_equations(&state.values, &group.targets, r);
         }

@@ -230,7 +230,7 @@ fn source_stepping(
     let mut kept = state.clone();
     while reached < 1.0 && step > 1e-4 {
         let next: f64 = (reached + step).min(1.0);
-        network.drive = next;
+        network.set_drive(next);
         if solve(network, question, false, 60, state, scratch).is_ok() {
             kept.copy_from(state);
             reached = next;
@@ -240,7 +240,7 @@ fn source_stepping(
             step *= 0.25;
         }
     }
-    network.drive = 1.0;
+    network.set_drive(1.0);
     if reached >= 1.0 { Ok(()) } else { Err(reached) }
 }
 

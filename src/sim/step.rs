@@ -126,10 +126,9 @@ fn enough(system: &System, settings: &Settings) -> Vec<f64> {
 
 /// Gives sources their DC values, where they have one beside what they are over time.
 pub(super) fn set_to_dc(network: &mut Network) {
-    for (segment, source) in network.segments.iter_mut().zip(&network.system.sources) {
-        if let Some(value) = source.parts.dc {
-            *segment = Waveform::Constant(value).segment(0.0);
-        }
+    let sources = network.system.sources.iter().enumerate();
+    for (k, value) in sources.filter_map(|(k, source)| Some((k, source.parts.dc?))) {
+        network.set_segment(k, Waveform::Constant(value).segment(0.0));
     }
 }
 
@@ -158,7 +157,7 @@ const LOST: f64 = 60.0;
 
 /// Iterations may leave this part of a step's error, and of none less than this part of its tolerance.
 const UNCONFIRMED: f64 = 0.05;
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE: f64 = 2e-5;
 
 fn stored(system: &System) -> Vec<u32> {
     let columns = system.charges.triplets().filter(|(.., value)| *value != 0.0);

@@ -130,3 +130,58 @@ fn what_is_wrong_is_told_of_the_whole_circuit() {
     assert!(prepare(&mut map, file, &Overrides::default(), None, &mut d).is_none());
     assert!(d.iter().any(|d| d.code == "E0781"), "{d:#?}");
 }
+
+/// A chopper into a filter; the gate is as given.
+fn chopper(gate: &str, saved: &str) -> String {
+    format!(
+        "a chopper\nVin in 0 24\n{gate}\nS1 in sw g h SWM\nS2 0 sw h g SWN\nL1 sw out 100u ic=0\nC1 out 0 220u ic=0\n\
+         Rl out 0 2.4\n.model SWM SW(Vt=2.5 Vh=0.1 Ron=10m Roff=1MEG)\n.model SWN SW(Vt=-2.5 Vh=0.1 Ron=10m Roff=1MEG)\n\
+         .options reltol=1e-7\n.save v(out) i(L1) {saved}\n.tran 1u 1m uic\n.end\n"
+    )
+}
+
+#[test]
+fn switches_that_sources_drive_change_at_times_known_beforehand() {
+    let ramps = "Vg g 0 PULSE(0 5 10u 1u 2u 20u 50u)\nVh h 0 0";
+    let jumps = "Vg g 0 PULSE(0 5 10u 0 0 20u 50u)\nVh h 0 0";
+    let sum = "Vg g m PULSE(0 5 10u 1u 2u 20u 50u)\nVm m 0 PWL(0 0 1m 1)\nVh h 0 PWL(0 -1 1m 0)";
+    for (name, gate) in [("ramps", ramps), ("jumps", jumps), ("sum", sum)] {
+        for saved in ["", "v(g)"] {
+            let run = prepared(name, &chopper(gate, saved));
+            let [whole, small] = systems(&run);
+            let settings = run.settings.as_ref().expect("a run over time");
+            let mut sink = bondspice::trace::Nowhere;
+            let counted = |system| sim::transient(system, settings, &mut sink).expect("a run");
+            let counts: Vec<_> = [&whole, &small].into_iter().map(counted).collect();
+            // Twenty periods of two edges for two switches, and none of them searched for. That one is on to begin with is an
+            // event where it is found.
+            assert_eq!(counts[1].events, 80, "{name}");
+            assert!((80..=81).contains(&counts[0].events), "{name}: {}", counts[0].events);
+            assert!(counts[0].rejected.event > 0 || name == "jumps", "{name}");
+            assert_eq!(counts[1].rejected.event, 0, "{name}");
+            // Where nobody sees the gate, its corners end no step.
+            assert_eq!(counts[1].corners == 0, saved.is_empty(), "{name}");
+            let off = difference(&course(&run, &whole), &course(&run, &small));
+            assert!(off < 1e-6, "{name} {saved}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn a_switch_that_is_driven_by_anything_else_is_watched() {
+    // By a sine, through a resistance, by what the circuit does.
+    for gate in [
+        "Vg g 0 SIN(2.5 2.5 20k)\nVh h 0 0",
+        "Vs s 0 PULSE(0 5 10u 1u 2u 20u 50u)\nRg s g 10\nCg g 0 1n\nVh h 0 0",
+        "Eg g 0 out 0 0.3\nVh h 0 PULSE(0 -5 10u 1u 1u 20u 50u)",
+    ] {
+        let run = prepared("watched", &chopper(gate, ""));
+        let [whole, small] = systems(&run);
+        let settings = run.settings.as_ref().expect("a run over time");
+        let counted =
+            sim::transient(&small, settings, &mut bondspice::trace::Nowhere).expect("a run");
+        assert!(counted.rejected.event > 0, "{gate}");
+        let off = difference(&course(&run, &whole), &course(&run, &small));
+        assert!(off < 1e-5, "{gate}: {off:e}");
+    }
+}

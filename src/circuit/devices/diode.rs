@@ -238,8 +238,14 @@ impl Depletion {
         let Depletion { capacitance: cj, potential: vj, grading: m, forward: fc } = *self;
         let base = add(number(1.0), times(v(), number(-1.0 / vj)));
         // The base is positive where this branch counts; elsewhere |base| keeps it a number.
-        let power = Law::call(Function::PowerOfAbs, vec![base, number(1.0 - m)]);
-        let depleted = times(number(cj * vj / (1.0 - m)), add(number(1.0), power.negate()));
+        let depleted = if m == 0.5 {
+            // The same as 2·cj·vj·(1 − √base), which for small voltages would be the difference of two that are almost equal.
+            let root = Law::call(Function::Sqrt, vec![Law::call(Function::Abs, vec![base])]);
+            times(number(2.0 * cj), v().binary(Binary::Divide, add(number(1.0), root)))
+        } else {
+            let power = Law::call(Function::PowerOfAbs, vec![base, number(1.0 - m)]);
+            times(number(cj * vj / (1.0 - m)), add(number(1.0), power.negate()))
+        };
         let (limit, f2, f3) = (fc * vj, (1.0 - fc).powf(1.0 + m), 1.0 - fc * (1.0 + m));
         let f1 = vj / (1.0 - m) * (1.0 - (1.0 - fc).powf(1.0 - m));
         let constant = cj * (f1 - (f3 * limit + m / (2.0 * vj) * limit * limit) / f2);
@@ -338,6 +344,17 @@ mod tests {
         let depletion = diode(DiodeModel { transit_time: 0.0, ..model }, 1.0);
         let depletion = at(depletion.charges[0].law.as_ref().unwrap(), 0.65);
         assert!((at(charge, 0.65) - depletion - 1e-9 * i).abs() < 1e-24);
+    }
+
+    #[test]
+    fn small_voltages_keep_all_their_digits() {
+        // Cjo·v·(1 + v/(4·Vj)) at a grading of a half; the difference of 1 and a root has none of them left.
+        let model = DiodeModel { junction_capacitance: 1e-12, transit_time: 0.0, ..MODEL };
+        let stamps = diode(model, 1.0);
+        let charge = stamps.charges[0].law.as_ref().unwrap();
+        for v in [1e-18, -1e-12, 1e-9] {
+            assert!((at(charge, v) / (1e-12 * v * (1.0 + 0.25 * v)) - 1.0).abs() < 1e-14, "{v}");
+        }
     }
 
     #[test]

@@ -277,6 +277,8 @@ pub(crate) mod testing {
                 }
             }
             Node::Call(Function::Exp, a) => of(&a[0]).exp(),
+            Node::Call(Function::Abs, a) => of(&a[0]).abs(),
+            Node::Call(Function::Sqrt, a) => of(&a[0]).sqrt(),
             Node::Call(Function::PowerOfAbs, a) => of(&a[0]).abs().powf(of(&a[1])),
             Node::If(c, a, b) => {
                 if of(c) != 0.0 {

@@ -22,7 +22,7 @@ const BOUND_AT_ONCE: u32 = 2;
 const PATIENCE: u32 = 2;
 
 /// A limit of no more than this part of the run is likely to bind.
-const LIKELY: f64 = 0.01;
+const LIKELY: f64 = 0.05;
 /// Why the trapezoidal rule is taken.
 const BINDS: &str = "the step limit binds";
 

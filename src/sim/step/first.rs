@@ -56,10 +56,10 @@ impl First {
         if let Some((mode, value)) = network.struck {
             return self.event(mode, value);
         }
-        let mut segments = network.segments.iter();
+        let mut segments = network.segments().iter();
         let found = segments.position(|segment| (segment.start - t).abs() <= slack);
         self.present = found.map(|k| {
-            let segment = &network.segments[k];
+            let segment = &network.segments()[k];
             let at = segment.start;
             self.place(Kind::Corner(k, segment.value(at), segment.derivative(at)))
         });

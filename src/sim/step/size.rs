@@ -6,7 +6,7 @@ use crate::sim::methods::{self, Method};
 /// The part of the step that an error allows which is taken: a step too long costs methods of many stages more than some
 /// that are a little too short.
 fn safety(power: f64) -> f64 {
-    if power > 3.0 { 0.8 } else { 0.9 }
+    if power > 3.0 { 0.85 } else { 0.9 }
 }
 
 /// A step becomes no smaller than this part of the last one without having failed.
