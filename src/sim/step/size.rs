@@ -3,12 +3,8 @@
 use super::Run;
 use crate::sim::methods::{self, Method};
 
-/// The part of the step that an error allows which is taken: a step too long costs methods of many stages more than some
-/// that are a little too short.
-fn safety(power: f64) -> f64 {
-    if power > 3.0 { 0.85 } else { 0.9 }
-}
-
+/// The part of the step that an error allows which is taken.
+const SAFETY: f64 = 0.9;
 /// A step becomes no smaller than this part of the last one without having failed.
 const LEAST: f64 = 0.2;
 /// Errors below this say nothing of how the solution changes.
@@ -16,7 +12,7 @@ const NOTHING: f64 = 1e-2;
 
 /// The factor by which a step is shortened whose error was too large.
 pub(super) fn after_error(error: f64, power: f64) -> f64 {
-    (safety(power) * methods::growth(error, power)).clamp(0.1, 0.9)
+    (SAFETY * methods::growth(error, power)).clamp(0.1, 0.9)
 }
 
 /// Where factors are dear, a step that could change by these factors keeps its length.
@@ -44,10 +40,10 @@ impl Run<'_> {
         let most_allowed = if failed { 1.0 } else { most };
         // Most steps under a limit err by next to nothing, and need no root to know it.
         let longer = before.is_none_or(|(_, last)| h >= 0.7 * last);
-        if longer && size <= (safety(power) / most).powi(power as i32).min(NOTHING) {
+        if longer && size <= (SAFETY / most).powi(power as i32).min(NOTHING) {
             return most_allowed;
         }
-        let mut factor = safety(power) * methods::growth(size, power);
+        let mut factor = SAFETY * methods::growth(size, power);
         if let Some((last_error, last_h)) = before {
             // Gustafsson's predictive controller: the error of the last step says how the solution changes.
             let trend = h / last_h * methods::growth(size / last_error, power);
