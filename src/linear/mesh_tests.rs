@@ -50,6 +50,45 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(11), ..ProptestConfig::default() })]
 
     #[test]
+    fn long_lines_are_solved_many_nodes_at_a_time(
+        seed: u64, nodes in 256usize..700, taps in 0usize..20, decades in 0.0f64..3.0,
+    ) {
+        let mut r = Random(seed);
+        let mut m = Matrix::new(nodes + 1);
+        for i in 0..nodes {
+            m.conductance(i, usize::MAX, r.decade(-decades, decades));
+            if i > 0 {
+                m.conductance(i, i - 1, r.decade(-decades, decades));
+            }
+        }
+        // Branches from one part of the line to another, and a source at its end.
+        for _ in 0..taps {
+            let (a, b) = (r.below(nodes), r.below(nodes));
+            if a != b {
+                m.conductance(a, b, r.decade(-decades, decades));
+            }
+        }
+        m.branch(0, usize::MAX, nodes, 0.0);
+        let (pattern, values) = m.pattern();
+        let mut factors = Factors::new(&pattern, &values, false, &mut Orders::default()).unwrap();
+        prop_assert!(factors.is_symmetric());
+        let b: Vec<f64> = (0..m.n).map(|_| r.unit()).collect();
+        let k = r.decade(-3.0, 3.0);
+        let scaled: Vec<f64> = values.iter().map(|v| k * v).collect();
+        for values in [&values, &scaled] {
+            prop_assert_eq!(factors.refactor(values), Ok(()));
+            let (x, error) = refined(&mut factors, &pattern, values, &b);
+            prop_assert!(error < 1e-13, "{error}");
+            let lu = Lu::factor(&pattern, values).unwrap();
+            let (mut y, mut residual, mut work) = (b.clone(), vec![0.0; m.n], vec![0.0; m.n]);
+            lu.solve(&mut y, &mut work);
+            lu.refine(&pattern, values, &b, &mut y, &mut residual, &mut work);
+            let scale = y.iter().fold(0.0f64, |s, v| s.max(v.abs()));
+            prop_assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() <= 1e-9 * scale));
+        }
+    }
+
+    #[test]
     fn meshes_are_factored_as_symmetric_ones(
         seed: u64, nodes in 2usize..70, sources in 0usize..3, inductors in 0usize..6, decades in 0.0f64..4.0,
     ) {

@@ -24,7 +24,9 @@ use super::settings::Settings;
 use super::statistics::Statistics;
 use super::step;
 use super::system::System;
-use crate::circuit::stamps::{Law, LawStamp, Leaf, Stamps, Terms, UnknownId};
+use crate::circuit::stamps::{
+    Charge, Law, LawStamp, Leaf, MemoryStamp, Mode, SourceStamp, Stamps, Terms, UnknownId,
+};
 use crate::expr::{Dag, Node};
 use crate::trace::{Nowhere, Sink};
 use smallvec::SmallVec;
@@ -410,43 +412,69 @@ impl<'a> Condenser<'a> {
             row.sources.iter().for_each(|(s, factor)| of_sources[*s as usize].push((own, *factor)));
             row.laws.iter().for_each(|(l, factor)| of_laws[*l as usize].push((own, *factor)));
         }
-        let mut condensed = Stamps { conductances, nodes, ..stamps.clone() };
-        condensed.unknowns = kept.iter().map(|c| stamps.unknowns[*c as usize].clone()).collect();
-        for (source, into) in condensed.sources.iter_mut().zip(of_sources) {
-            source.into = into;
-        }
+        let left = |values: &Terms| -> Terms {
+            let left = values.iter().filter(|(node, _)| !self.gone[node.0 as usize]);
+            left.map(|(node, value)| (column(node.0), *value)).collect()
+        };
         // Corners of sources that nothing follows from end no step.
-        condensed.sources.retain(|source| !source.into.is_empty());
+        let sources = stamps.sources.iter().zip(of_sources).filter(|(_, into)| !into.is_empty());
         let mut items = self.items.iter();
         let laws = stamps.laws.iter().zip(of_laws).zip(items.by_ref());
-        condensed.laws = laws
-            .filter(|((_, into), _)| !into.is_empty())
-            .map(|((stamp, into), item)| {
-                let mut junction = stamp.junction;
-                for end in junction.iter_mut().flat_map(|junction| &mut junction.across).flatten() {
-                    *end = column(end.0);
-                }
-                LawStamp { device: stamp.device, law: renamed(&item.law), into, junction }
-            })
-            .collect();
-        for charge in &mut condensed.charges {
-            charge.linear = charge.linear.iter().map(|(c, value)| (column(c.0), *value)).collect();
-            charge.into = into(&charge.into);
-            if let Some((law, item)) = charge.law.as_mut().zip(items.next()) {
-                *law = renamed(&item.law);
+        let laws = laws.filter(|((_, into), _)| !into.is_empty()).map(|((stamp, into), item)| {
+            let mut junction = stamp.junction;
+            for end in junction.iter_mut().flat_map(|junction| &mut junction.across).flatten() {
+                *end = column(end.0);
             }
+            LawStamp { device: stamp.device, law: renamed(&item.law), into, junction }
+        });
+        let laws = laws.collect();
+        // Of charges only those with laws have items.
+        let mut law_of = |charge: &Charge| {
+            charge.law.as_ref().and_then(|_| items.next()).map(|item| renamed(&item.law))
+        };
+        Stamps {
+            spoken: stamps.spoken.clone(),
+            unknowns: kept.iter().map(|c| stamps.unknowns[*c as usize].clone()).collect(),
+            nodes,
+            conductances,
+            charges: stamps
+                .charges
+                .iter()
+                .map(|charge| Charge {
+                    law: law_of(charge),
+                    linear: charge.linear.iter().map(|(c, v)| (column(c.0), *v)).collect(),
+                    into: into(&charge.into),
+                    ..*charge
+                })
+                .collect(),
+            laws,
+            sources: sources.map(|(source, into)| SourceStamp { into, ..source.clone() }).collect(),
+            memories: stamps
+                .memories
+                .iter()
+                .map(|memory| MemoryStamp {
+                    input: renamed(&memory.input),
+                    into: into(&memory.into),
+                    ..*memory
+                })
+                .collect(),
+            modes: stamps
+                .modes
+                .iter()
+                .map(|mode| Mode { control: renamed(&mode.control), ..mode.clone() })
+                .collect(),
+            outputs: stamps
+                .outputs
+                .iter()
+                .map(|(name, law)| (name.clone(), renamed(law)))
+                .collect(),
+            watched: stamps.watched,
+            initial: left(&stamps.initial),
+            guesses: left(&stamps.guesses),
+            starts: left(&stamps.starts),
+            initial_holds: stamps.initial_holds,
+            devices: stamps.devices.clone(),
         }
-        for memory in &mut condensed.memories {
-            memory.input = renamed(&memory.input);
-            memory.into = into(&memory.into);
-        }
-        condensed.modes.iter_mut().for_each(|mode| mode.control = renamed(&mode.control));
-        condensed.outputs.iter_mut().for_each(|(_, law)| *law = renamed(law));
-        for values in [&mut condensed.initial, &mut condensed.guesses, &mut condensed.starts] {
-            let left = values.iter().filter(|(node, _)| !self.gone[node.0 as usize]);
-            *values = left.map(|(node, value)| (column(node.0), *value)).collect();
-        }
-        condensed
     }
 }
 

@@ -255,6 +255,7 @@ fn orders_of_convergence_on_an_algebraic_system() {
     let system = algebraic();
     let exact = 2.0 + 1f64.sin();
     for (method, steps, expected) in [
+        (Method::Rodas3, [64.0, 128.0], 3.0),
         (Method::Rodas4, [64.0, 128.0], 4.0),
         (Method::Rodas5p, [32.0, 64.0], 5.0),
         (Method::TrBdf2, [32.0, 64.0], 2.0),

@@ -112,6 +112,24 @@ fn what_follows_is_no_unknown_and_what_is_saved_is_one() {
 }
 
 #[test]
+fn charges_with_laws_of_their_own_stand_behind_others() {
+    // A linear capacitor first: the law of the second belongs to the second. Then a junction's.
+    for stores in
+        ["C2 b 0 Q={1u*V(b)+0.3u*V(b)*V(b)*V(b)}", "D1 b 0 DM\n.model DM D(Is=1e-14 Cjo=1u Rs=1)"]
+    {
+        let text = format!(
+            "order\nV1 s 0 SIN(0 5 1k)\nB1 m 0 V={{2*tanh(V(s))}}\nR1 m a 100\nC1 a 0 1u\nR2 a b 100\n{stores}\n\
+             R3 b 0 1k\n.options reltol=1e-7\n.save v(a) v(b)\n.tran 1u 3m uic\n.end\n"
+        );
+        let run = prepared("order.cir", &text);
+        let [whole, small] = systems(&run);
+        assert!(small.equations() < whole.equations());
+        let off = difference(&course(&run, &whole), &course(&run, &small));
+        assert!(off < 2e-6, "{stores}: {off:e}");
+    }
+}
+
+#[test]
 fn what_is_wrong_is_told_of_the_whole_circuit() {
     // Nothing gives v(p) once the table has ended; the node between would not be an unknown of the run.
     let text = "a\nI1 0 p PWL(0 0 1 10)\nVp p p2 0\nB1 p2 0 I={table(v(p2), -1, -1, 1, 1)}\nR1 a 0 1k\nC1 a 0 1u\n\
@@ -165,6 +183,19 @@ fn switches_that_sources_drive_change_at_times_known_beforehand() {
             assert!(off < 1e-6, "{name} {saved}: {off:e}");
         }
     }
+}
+
+#[test]
+fn a_pilot_pass_ends_when_all_magnitudes_are_known() {
+    // At 1e-3 floors follow magnitudes up to 1 V and 1 µA, which the first period shows; guards are looked at to the end.
+    let gate = "Vg g 0 PULSE(0 5 10u 1u 2u 20u 50u)\nVh h 0 0";
+    let run = prepared("pilot", &chopper(gate, "").replace("reltol=1e-7", "reltol=1e-3"));
+    let settings = run.settings.as_ref().expect("a run over time");
+    let pilots = systems(&run).map(|system| {
+        let counted = sim::transient(&system, settings, &mut bondspice::trace::Nowhere);
+        counted.expect("a run").pilot
+    });
+    assert!(pilots[1] < 50 && pilots[0] > 200, "{pilots:?}");
 }
 
 #[test]

@@ -130,14 +130,11 @@ impl History {
     /// k₁ of the parabola of each unknown asked for through the point before, and the two ends of a step; 0 where there is
     /// no point before.
     pub fn bend(&self, from: &State, to: &State, k: &mut [f64], asked: Option<&[u32]>) {
-        let one = match self.count {
+        let (h, last) = (to.t - from.t, from.t - self.times[0]);
+        let (a, b) = match self.count {
             0 => (0.0, 0.0),
-            _ => {
-                let (h, last) = (to.t - from.t, from.t - self.times[0]);
-                (h / (h + last), h * h / (last * (h + last)))
-            }
+            _ => (h / (h + last), h * h / (last * (h + last))),
         };
-        let (a, b) = one;
         let bend = |before: f64, from: f64, to: f64| b * (from - before) - a * (to - from);
         let before = &self.x[0];
         match asked {
