@@ -216,3 +216,48 @@ fn a_switch_that_is_driven_by_anything_else_is_watched() {
         assert!(off < 1e-5, "{gate}: {off:e}");
     }
 }
+
+/// A network of `nodes` nodes behind a source, each tied to the one before: stores, laws and links as listed.
+fn network(nodes: usize, parts: &[(u8, usize, usize)], saved: usize) -> String {
+    let mut text = String::from("random\nV1 n0 0 SIN(0 3 800)\n");
+    for k in 1..=nodes {
+        text += &format!("R{k} n{} n{k} {}\nRg{k} n{k} 0 2k\n", k - 1, 100 + 30 * k);
+    }
+    let node = |k: usize| format!("n{}", 1 + k % nodes);
+    for (i, (kind, a, b)) in parts.iter().enumerate() {
+        let (a, b) = (node(*a), node(*b));
+        text += &match kind % 6 {
+            0 => format!("C{i} {a} 0 0.4u\n"),
+            1 => format!("Cq{i} {a} 0 Q={{0.3u*V({a})+0.05u*V({a})*V({a})*V({a})}}\n"),
+            2 => format!("D{i} {a} 0 DM\n"),
+            // A law over a law, and a gain behind it.
+            3 => format!(
+                "Bu{i} u{i} 0 V={{2*tanh(V({a})-0.5*V({b}))}}\nEu{i} w{i} 0 u{i} 0 0.7\nRu{i} w{i} {b} 500\n"
+            ),
+            4 => format!("Bi{i} {a} 0 I={{1m*tanh(V({a})-V({b}))}}\n"),
+            _ => format!(
+                "L{i} {a} l{i} 20m\nVi{i} l{i} k{i} 0\nRl{i} k{i} 0 300\nFi{i} 0 {b} Vi{i} 0.2\n"
+            ),
+        };
+    }
+    text += ".model DM D(Is=1e-12 N=1.5 Cjo=0.1u Rs=5)\n.options reltol=1e-6\n";
+    text + &format!(".save v({}) i(V1)\n.tran 1u 3m uic\n.end\n", node(saved))
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 60, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn random_networks_run_alike_with_fewer_unknowns(
+        nodes in 2usize..6,
+        parts in proptest::collection::vec((0u8..6, 0usize..6, 0usize..6), 2..9),
+        saved in 0usize..6,
+    ) {
+        let text = network(nodes, &parts, saved);
+        let run = prepared("random.cir", &text);
+        let [whole, small] = systems(&run);
+        proptest::prop_assert!(small.equations() <= whole.equations());
+        let off = difference(&course(&run, &whole), &course(&run, &small));
+        proptest::prop_assert!(off < 1e-4, "{off:e}, {} for {}\n{text}", small.equations(), whole.equations());
+    }
+}
