@@ -395,11 +395,25 @@ proptest! {
     }
 }
 
+/// Whether a value is true or false by more than rounding: a text may write a 0 as a cosine of a right angle.
+fn is_decided(expr: &Expr<String>) -> bool {
+    let truth = match &*expr.node {
+        Node::Number(_) | Node::Unary(Unary::Not, _) => true,
+        Node::Binary(op, ..) => op.is_comparison() || matches!(op, Binary::And | Binary::Or),
+        _ => false,
+    };
+    truth || expr.evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5).abs() > 1e-9
+}
+
 /// Whether all values on the way are finite and of common size.
 fn tame(expr: &Expr<String>) -> bool {
     let inner = match &*expr.node {
         Node::Number(_) | Node::Leaf(_) => true,
+        Node::Unary(Unary::Not, a) => tame(a) && is_decided(a),
         Node::Unary(_, a) | Node::Table(a, _) => tame(a),
+        Node::Binary(Binary::And | Binary::Or, a, b) => {
+            tame(a) && tame(b) && is_decided(a) && is_decided(b)
+        }
         Node::Binary(op, a, b) => {
             // Where rounding decides, texts may differ: comparisons of equal values are left out.
             let difference =
@@ -437,7 +451,7 @@ fn tame(expr: &Expr<String>) -> bool {
                     });
             arguments.iter().all(tame) && smooth
         }
-        Node::If(c, a, b) => tame(c) && tame(a) && tame(b),
+        Node::If(c, a, b) => tame(c) && tame(a) && tame(b) && is_decided(c),
     };
     inner && expr.evaluate(&mut |n| n.len() as f64 * 0.37 - 0.5).abs() < 1e6
 }
