@@ -1,8 +1,8 @@
 //! What the parts of a run cost: `cargo bench --bench parts [NAME]`, those whose name holds NAME.
 //!
-//! Each line is the least time of one call over a fifth of a second, and what it is to the line's peer, measured in the same run: a
-//! program to the tree it was compiled from, one replay and solution of a matrix to faer's sparse LU (its order known) or to a dense
-//! one, a step to another step. Times of different machines say nothing of each other; ratios in one run do.
+//! Each line is the least time of one call over a fifth of a second, and how many times as long its peer takes in the same run: the
+//! tree that a program was compiled from, faer's sparse LU (its order known) for one replay and solution of a matrix, the run of a
+//! netlist for the stages before it. Times of different machines say nothing of each other; ratios in one run do.
 
 use bondspice::circuit::stamps;
 use bondspice::expr::{Binary, Dag, Expr, Function, Program};

@@ -27,7 +27,7 @@ use super::system::System;
 use crate::circuit::stamps::{
     Charge, Law, LawStamp, Leaf, MemoryStamp, Mode, SourceStamp, Stamps, Terms, UnknownId,
 };
-use crate::expr::{Dag, Node};
+use crate::expr::Node;
 use crate::trace::{Nowhere, Sink};
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
@@ -543,14 +543,6 @@ fn occurrences(law: &Law, unknown: u32) -> usize {
 
 /// The factors of a law that is a sum of multiples of unknowns, and nothing besides.
 fn linear(law: &Law, n: u32) -> Option<Vec<(u32, f64)>> {
-    let mut dag = Dag::default();
-    let added: Result<_, std::convert::Infallible> = dag.add(law, &mut |dag, leaf, _| {
-        Ok(dag.input(match leaf {
-            Leaf::Unknown(id) => id.0,
-            Leaf::Time | Leaf::Rate(_) | Leaf::Mode(_) => n,
-        }))
-    });
-    let Ok(node) = added;
-    let (constant, factors) = dag.affine(node)?;
+    let (constant, factors) = driven::affine(law, n)?;
     (constant == 0.0 && factors.iter().all(|(input, _)| *input < n)).then_some(factors)
 }

@@ -57,11 +57,10 @@ pub(super) fn dc(job: &Job, sink: &mut dyn Sink) -> Result<Statistics, Failure> 
             if self::fixed(&sources, &values) != fixed {
                 break;
             }
-            for (source, value) in sources.iter().zip(&values) {
-                if let Some(at) = source {
-                    network.set_segment(*at, Waveform::Constant(*value).segment(0.0));
-                }
-            }
+            let swept = sources.iter().zip(&values).filter_map(|(at, value)| Some(((*at)?, value)));
+            let constant =
+                |(at, value): (usize, &f64)| (at, Waveform::Constant(*value).segment(0.0));
+            network.set_segments(swept.map(constant));
             network.forget_constant_factors();
             let state =
                 solve(&mut network, start.as_ref(), &floors, &mut work).map_err(|trouble| {

@@ -78,16 +78,7 @@ fn driven(stamps: &Stamps) -> Vec<Option<Sum>> {
 
 /// The course of a sum of unknowns that are all driven.
 fn course(stamps: &Stamps, control: &Law, driven: &[Option<Sum>]) -> Option<Course> {
-    let n = stamps.unknowns.len() as u32;
-    let mut dag = Dag::default();
-    let added: Result<_, std::convert::Infallible> = dag.add(control, &mut |dag, leaf, _| {
-        Ok(dag.input(match leaf {
-            Leaf::Unknown(id) => id.0,
-            Leaf::Time | Leaf::Rate(_) | Leaf::Mode(_) => n,
-        }))
-    });
-    let Ok(node) = added;
-    let (constant, factors) = dag.affine(node)?;
+    let (constant, factors) = affine(control, stamps.unknowns.len() as u32)?;
     let mut sum = Sum::new();
     for (unknown, factor) in factors {
         for (source, by) in driven.get(unknown as usize)?.as_ref()? {
@@ -99,4 +90,17 @@ fn course(stamps: &Stamps, control: &Law, driven: &[Option<Sum>]) -> Option<Cour
         is_lines(waveform).then(|| (factor, waveform.clone()))
     });
     Some(Course { constant, terms: terms.collect::<Option<_>>()? })
+}
+
+/// Constant and factors of a law that is affine in what it speaks of: unknowns by their numbers, anything else by `n`.
+pub(super) fn affine(law: &Law, n: u32) -> Option<(f64, Vec<(u32, f64)>)> {
+    let mut dag = Dag::default();
+    let added: Result<_, std::convert::Infallible> = dag.add(law, &mut |dag, leaf, _| {
+        Ok(dag.input(match leaf {
+            Leaf::Unknown(id) => id.0,
+            Leaf::Time | Leaf::Rate(_) | Leaf::Mode(_) => n,
+        }))
+    });
+    let Ok(node) = added;
+    dag.affine(node)
 }

@@ -63,20 +63,11 @@ pub(crate) struct Registers {
 impl LawSet {
     /// Compiles values and derivatives by the inputs below `inputs`.
     pub fn new(dag: &mut Dag, laws: &[NodeId], inputs: u32) -> LawSet {
-        let mut outputs = laws.to_vec();
-        let mut set = LawSet { starts: vec![0], ..LawSet::default() };
-        for law in laws {
-            for (input, derivative) in dag.partials(*law) {
-                if input < inputs {
-                    set.inputs.push(input);
-                    outputs.push(derivative);
-                }
-            }
-            set.starts.push(set.inputs.len() as u32);
-        }
-        set.values = Program::compile(dag, laws);
-        set.full = Program::compile(dag, &outputs);
-        set
+        LawSet::with_slopes(dag, laws, |dag, law| {
+            let mut slopes = dag.partials(law);
+            slopes.retain(|(input, _)| *input < inputs);
+            slopes
+        })
     }
 
     /// Compiles values and derivatives of laws over the voltage of a junction, which is `voltage` among the inputs: those by
@@ -87,14 +78,27 @@ impl LawSet {
         voltage: u32,
         junction: &Junction,
     ) -> LawSet {
+        let [anode, cathode] = junction.across;
+        LawSet::with_slopes(dag, laws, |dag, law| {
+            let slope = dag.derivative(law, voltage);
+            let by_anode = anode.map(|unknown| (unknown.0, slope));
+            let by_cathode = cathode.map(|unknown| (unknown.0, dag.unary(Unary::Negate, slope)));
+            by_anode.into_iter().chain(by_cathode).collect()
+        })
+    }
+
+    /// Compiles values, and the derivatives that `slopes` gives of each law, with what each is taken by.
+    fn with_slopes(
+        dag: &mut Dag,
+        laws: &[NodeId],
+        mut slopes: impl FnMut(&mut Dag, NodeId) -> Vec<(u32, NodeId)>,
+    ) -> LawSet {
         let mut outputs = laws.to_vec();
         let mut set = LawSet { starts: vec![0], ..LawSet::default() };
         for law in laws {
-            let slope = dag.derivative(*law, voltage);
-            for (end, unknown) in junction.across.iter().enumerate() {
-                let Some(unknown) = unknown else { continue };
-                set.inputs.push(unknown.0);
-                outputs.push(if end == 0 { slope } else { dag.unary(Unary::Negate, slope) });
+            for (input, derivative) in slopes(dag, *law) {
+                set.inputs.push(input);
+                outputs.push(derivative);
             }
             set.starts.push(set.inputs.len() as u32);
         }

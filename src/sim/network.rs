@@ -333,9 +333,9 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Sets a source's segment.
-    pub fn set_segment(&mut self, source: usize, segment: Segment) {
-        self.segments[source] = segment;
+    /// Puts sources on other segments.
+    pub fn set_segments(&mut self, new: impl Iterator<Item = (usize, Segment)>) {
+        new.for_each(|(source, segment)| self.segments[source] = segment);
         self.see_drives();
     }
 

@@ -127,9 +127,8 @@ fn enough(system: &System, settings: &Settings) -> Vec<f64> {
 /// Gives sources their DC values, where they have one beside what they are over time.
 pub(super) fn set_to_dc(network: &mut Network) {
     let sources = network.system.sources.iter().enumerate();
-    for (k, value) in sources.filter_map(|(k, source)| Some((k, source.parts.dc?))) {
-        network.set_segment(k, Waveform::Constant(value).segment(0.0));
-    }
+    let stated = sources.filter_map(|(k, source)| Some((k, source.parts.dc?)));
+    network.set_segments(stated.map(|(k, value)| (k, Waveform::Constant(value).segment(0.0))));
 }
 
 fn count_system(network: &mut Network, method: &str, reason: &str) {

@@ -45,6 +45,11 @@ fn swings(waveform: &Waveform, t: f64) -> f64 {
     if frequency.is_finite() { frequency } else { 0.0 }
 }
 
+/// The weight of an unknown: what it may be off, and not less than rounding makes of it.
+fn weight(allowed: f64, floor: f64) -> f64 {
+    allowed.max(floor).max(f64::MIN_POSITIVE)
+}
+
 impl Run<'_> {
     pub(super) fn start(&mut self) -> Result<(), Failure> {
         let network = &mut self.network;
@@ -298,8 +303,8 @@ impl Run<'_> {
         for (k, (largest, x)) in largest.iter_mut().zip(&state.x).enumerate() {
             if x.abs() > *largest {
                 *largest = x.abs();
-                let weight = settings.reltol * *largest + absolute[k];
-                weights[k] = weight.max(rounding.floors()[k]).max(f64::MIN_POSITIVE);
+                let allowed = settings.reltol * *largest + absolute[k];
+                weights[k] = weight(allowed, rounding.floors()[k]);
             }
         }
     }
@@ -313,8 +318,8 @@ impl Run<'_> {
             *largest = if x.abs() > *largest { x.abs() } else { *largest };
         }
         let bases = largest.iter().zip(absolute.iter()).zip(rounding.floors());
-        for (weight, ((largest, absolute), floor)) in weights.iter_mut().zip(bases) {
-            *weight = (part * (reltol * largest + absolute)).max(*floor).max(f64::MIN_POSITIVE);
+        for (own, ((largest, absolute), floor)) in weights.iter_mut().zip(bases) {
+            *own = weight(part * (reltol * largest + absolute), *floor);
         }
         if self.index2 || self.was_index2 {
             let tested = weights.iter_mut().zip(untested);
