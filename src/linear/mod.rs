@@ -29,7 +29,7 @@ mod mesh_tests;
 #[cfg(test)]
 mod tests;
 
-pub use cholesky::Orders;
+pub use cholesky::{Orders, dot};
 pub use components::components;
 pub use factors::Factors;
 pub use field::{Complex, Field, Prime, Prime61, Prime62};

@@ -26,7 +26,8 @@ pub(crate) struct Inside {
     pub point: State,
     /// Charges that are states.
     held: Vec<bool>,
-    /// The unknowns that are asked for.
+    /// The unknowns that are asked for, as a list and as marks.
+    unknowns: Vec<u32>,
     asked: Vec<bool>,
     /// Where every unknown asked for is one of a linear storage's own: unknown, charge, and charge for each unit of it.
     stored: Vec<(u32, u32, f64)>,
@@ -49,6 +50,7 @@ impl Inside {
         Inside {
             point: State::new(0.0, system.equations(), system.charges()),
             held: system.held.clone(),
+            unknowns: (0..system.equations() as u32).collect(),
             asked: vec![true; system.equations()],
             stored: vec![],
             few: None,
@@ -65,13 +67,12 @@ impl Inside {
         let system = network.system;
         let mut inside = Inside::new(network);
         if system.law_columns.is_empty() {
+            inside.unknowns = system.observed();
             inside.asked.fill(false);
-            let columns = system.plain_outputs.iter();
-            columns.for_each(|(_, unknown)| inside.asked[*unknown as usize] = true);
+            inside.unknowns.iter().for_each(|unknown| inside.asked[*unknown as usize] = true);
             inside.stored = stored_alone(system).unwrap_or_default();
-            let unknowns = (0..system.equations() as u32).filter(|k| inside.asked[*k as usize]);
-            let charges = inside.stored.iter().map(|(_, charge, _)| *charge);
-            let few = Asked { unknowns: unknowns.collect(), charges: charges.collect() };
+            let charges = inside.stored.iter().map(|(_, charge, _)| *charge).collect();
+            let few = Asked { unknowns: inside.unknowns.clone(), charges };
             inside.few = (!system.has_junctions()).then_some(few);
         }
         inside
@@ -110,8 +111,9 @@ impl Inside {
             return self.shorter_step(network, from, to, time, weights, work);
         }
         if !index2 && network.is_straight() {
-            for (k, x) in self.point.x.iter_mut().enumerate().filter(|(k, _)| self.asked[*k]) {
-                *x = work.dense.unknown(k, theta, from, to);
+            work.dense.look_at(theta);
+            for k in self.unknowns.iter().map(|unknown| *unknown as usize) {
+                self.point.x[k] = work.dense.unknown(k, theta, from, to);
             }
             self.point.t = time;
             return Ok(());

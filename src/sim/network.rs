@@ -364,6 +364,12 @@ impl<'a> Network<'a> {
         }
     }
 
+    /// b
+    pub fn drives(&self, t: f64, b: &mut [f64]) {
+        self.begin_residual(t, b);
+        b.iter_mut().for_each(|b| *b = -*b);
+    }
+
     /// r = −b
     fn begin_residual(&self, t: f64, r: &mut [f64]) {
         r.copy_from_slice(&self.rest);

@@ -2,6 +2,7 @@
 
 use super::near::{self, Near};
 use super::network::Network;
+use super::op::State;
 use super::search::Sought;
 use crate::circuit::DeviceId;
 use crate::linear::{Cause, Singular};
@@ -30,6 +31,9 @@ pub(crate) struct Scratch {
     before: Vec<f64>,
     /// Where iterations with factors of an earlier stage began.
     pub guess: Vec<f64>,
+    /// Where a search began, and the charges that it is for.
+    pub start: State,
+    pub targets: Vec<f64>,
     /// What the second update of a stage is of the first one's square, both weighted, as far as is known: with it, one
     /// iteration tells how far off it is, and no second one need confirm it.
     bend: f64,
@@ -48,6 +52,8 @@ impl Scratch {
             update: vec![0.0; n + charges],
             before: vec![0.0; n + charges],
             guess: vec![0.0; n],
+            start: State::new(0.0, n, charges),
+            targets: vec![0.0; charges],
             bend: f64::INFINITY,
             age: 0,
             near: Near::UNKNOWN,

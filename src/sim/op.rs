@@ -14,7 +14,7 @@ use super::ties;
 use crate::circuit::DeviceId;
 
 /// Values at an instant.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct State {
     pub t: f64,
     /// Unknowns.
@@ -30,12 +30,12 @@ impl State {
         State { t, x: vec![0.0; n], w: vec![0.0; charges], q: vec![0.0; charges] }
     }
 
-    /// Takes over the values of another, without allocation.
+    /// Takes over the values of another, without allocation where it is as large.
     pub fn copy_from(&mut self, other: &State) {
         self.t = other.t;
-        self.x.copy_from_slice(&other.x);
-        self.w.copy_from_slice(&other.w);
-        self.q.copy_from_slice(&other.q);
+        self.x.clone_from(&other.x);
+        self.w.clone_from(&other.w);
+        self.q.clone_from(&other.q);
     }
 }
 
@@ -93,7 +93,8 @@ pub(crate) fn consistent_values(
     scratch: &mut Scratch,
 ) -> Result<(), Trouble> {
     let held = &network.system.held;
-    let targets = state.q.clone();
+    let mut targets = std::mem::take(&mut scratch.targets);
+    targets.clone_from(&state.q);
     let question = Question { held, targets: &targets, floors, prime: false };
     let result = settle_modes(network, state, slides, |network, state| {
         search::find(network, &question, state, scratch)
@@ -102,6 +103,7 @@ pub(crate) fn consistent_values(
         // What the search left behind is no charge that anybody stated.
         state.q.copy_from_slice(&targets);
     }
+    scratch.targets = targets;
     result
 }
 

@@ -11,8 +11,9 @@ use super::settings::{Interval, Settings};
 use crate::trace::Sink;
 use std::io;
 
-/// How often a step is halved for straight lines at most.
+/// How often a step is halved for straight lines at most; one that goes all the way to a corner far more often.
 const MOST_HALVED: u32 = 8;
+const FAR_HALVED: u32 = 40;
 
 /// No line is asked to be straighter than this part of a column's range, however small `reltol` is: rows would be many
 /// for what nobody sees.
@@ -61,6 +62,8 @@ pub(crate) struct Rows<'a> {
     stop: f64,
     /// Times closer than this are the same.
     slack: f64,
+    /// Lines are no longer than a step may be.
+    longest: f64,
     reltol: f64,
     /// So many columns, the last ones, are measured.
     watched: usize,
@@ -92,6 +95,7 @@ impl<'a> Rows<'a> {
             start: settings.start,
             stop: settings.stop,
             slack: 1e-12 * settings.stop,
+            longest: settings.hmax.unwrap_or(f64::INFINITY),
             reltol: settings.reltol,
             watched: system.watched,
             least: 1e-2 * settings.abstol,
@@ -243,6 +247,8 @@ impl<'a> Rows<'a> {
             && (!network.system.has_junctions() || network.rests_within(&work.dense, from, to));
         let smooth = !index2 && (by_past || network.is_straight());
         let parabolic = by_past && network.system.law_columns.is_empty();
+        let far = work.dense.space.is_some();
+        let most_halved = if far { FAR_HALVED } else { MOST_HALVED };
         // Pieces are halved from the left; what is still to come lies on a pile.
         let mut left = std::mem::take(&mut self.left);
         left[0] = from.t;
@@ -254,10 +260,12 @@ impl<'a> Rows<'a> {
         while let Some((right, halved, before)) = self.pile.pop() {
             let span = right[0] - left[0];
             let mut off = 0.0;
-            if halved < MOST_HALVED && span > self.slack {
+            let long = far && span > self.longest * (1.0 + 1e-6);
+            if halved < most_halved && span > self.slack {
                 // A curve that swings about its line may cross it in the middle, and a bend may lie near an end; but a
                 // parabola is farthest from a line in the middle.
-                let asked: &[f64] = if parabolic { &[0.5] } else { &[0.5, 0.25, 0.75] };
+                let once = parabolic || long;
+                let asked: &[f64] = if once { &[0.5] } else { &[0.5, 0.25, 0.75] };
                 for &theta in asked {
                     let time = left[0] + theta * span;
                     if smooth {
@@ -278,8 +286,10 @@ impl<'a> Rows<'a> {
                 }
                 self.row.copy_from_slice(&self.middle);
             }
-            // What does not become straighter is rounding.
-            let straight = off <= STRAIGHT || (halved > 4 && off >= before);
+            // What does not become straighter is rounding, but within a step that goes far, where all may happen at its
+            // beginning.
+            let rounded = !far && halved > 4 && off >= before;
+            let straight = !long && (off <= STRAIGHT || rounded);
             if !straight {
                 if smooth {
                     let time = left[0] + 0.5 * span;
@@ -348,6 +358,7 @@ impl<'a> Rows<'a> {
         work: &mut Work,
     ) {
         let theta = (time - from.t) / (to.t - from.t);
+        work.dense.look_at(theta);
         if network.system.law_columns.is_empty() {
             self.row[0] = time;
             for (column, unknown) in &network.system.plain_outputs {

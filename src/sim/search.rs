@@ -49,7 +49,20 @@ pub(crate) fn find(
     state: &mut State,
     scratch: &mut Scratch,
 ) -> Result<(), Cut> {
-    let guess = state.clone();
+    let mut guess = std::mem::take(&mut scratch.start);
+    guess.copy_from(state);
+    let found = find_from(&guess, network, question, state, scratch);
+    scratch.start = guess;
+    found
+}
+
+fn find_from(
+    guess: &State,
+    network: &mut Network,
+    question: &Question,
+    state: &mut State,
+    scratch: &mut Scratch,
+) -> Result<(), Cut> {
     let first = match solve(network, question, question.prime, 100, state, scratch) {
         Ok(()) => return Ok(()),
         Err(cut) => cut,
@@ -66,8 +79,8 @@ pub(crate) fn find(
         // the circuit is of index 2, which is for the run to know.
         let n = network.system.equations() as u32;
         of_storages = singular.rows.iter().flatten().any(|row| *row >= n);
-        if !of_storages && misfit(network, question, &guess, scratch).is_empty() {
-            state.copy_from(&guess);
+        if !of_storages && misfit(network, question, guess, scratch).is_empty() {
+            state.copy_from(guess);
             return Ok(());
         }
     }
@@ -88,13 +101,13 @@ pub(crate) fn find(
         Err(reached) => reached,
     };
     best.see(network, question, state, scratch);
-    state.copy_from(&guess);
+    state.copy_from(guess);
     let pseudo = match pseudo_transient(network, question, state, scratch) {
         Ok(()) => return Ok(()),
         Err(reached) => reached,
     };
     best.see(network, question, state, scratch);
-    state.copy_from(&guess);
+    state.copy_from(guess);
     network.forget_pivots();
     let helped = gmin.is_some() || drive > 0.0 || pseudo.is_some();
     match first {

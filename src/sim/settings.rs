@@ -189,7 +189,7 @@ pub const OPTIONS: &[OptionRow] = &[
     OptionRow { name: "hmax", meaning: "the largest step in seconds, above 0, or `auto`", set: |s, v| time(v, &mut s.hmax) },
     OptionRow { name: "h0", meaning: "the first step in seconds, above 0, or `auto`", set: |s, v| time(v, &mut s.h0) },
     OptionRow { name: "jumps", meaning: "`after` or `before`: which value a row of a grid or list holds at a jump", set: set_jumps },
-    OptionRow { name: "method", meaning: "`auto`, `rodas5p`, `rodas4`, `trbdf2`, `trap` or `gear`", set: set_method },
+    OptionRow { name: "method", meaning: "`auto`, `exponential`, `rodas5p`, `rodas4`, `trbdf2`, `trap` or `gear`", set: set_method },
 ];
 
 /// Options of other simulators that have no meaning here and do no harm.

@@ -2,6 +2,7 @@
 
 mod bound;
 mod crossing;
+mod far;
 mod first;
 pub(super) mod past;
 mod restart;
@@ -12,14 +13,15 @@ mod trouble;
 
 use self::bound::Bound;
 use self::crossing::{Crossed, Located, Search};
+use self::far::Far;
 use self::first::First;
 use self::rounding::Rounding;
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
-use super::events::Controls;
+use super::events::{Controls, Track};
 use super::explain::{Failure, FailureKind, Moment, failure};
 use super::inside::Inside;
-use super::methods::{self, Method, Work};
+use super::methods::{self, Method, Work, exponential};
 use super::network::Network;
 use super::newton::Cut;
 use super::op::{self, State};
@@ -29,6 +31,7 @@ use super::statistics::Statistics;
 use super::system::System;
 use crate::circuit::Waveform;
 use crate::circuit::stamps::Unknown;
+use crate::linear::Orders;
 use crate::trace::Sink;
 
 /// Values of an operating point.
@@ -76,42 +79,76 @@ pub fn transient(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
+    // Exponentials take what is moved from what they find.
+    let pilot = match exponential::suits(system, settings) {
+        true => None,
+        false => pilot(system, settings)?,
+    };
+    let mut run = Run::new(system, settings, pilot.as_ref(), Some(sink));
+    run.run()?;
+    Ok(run.network.statistics)
+}
+
+/// What a pilot pass has seen: magnitudes of unknowns, ranges of guards; and what it took.
+struct Seen {
+    largest: Vec<f64>,
+    statistics: Statistics,
+    tracks: Vec<Track>,
+    orders: Orders,
+}
+
+/// A coarse run beforehand, where floors follow magnitudes.
+fn pilot(system: &System, settings: &Settings) -> Result<Option<Seen>, Failure> {
     /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order, and with few solutions,
     /// are the cheapest then.
     const PILOT: f64 = 1e-1;
     const COARSE: f64 = 1e-2;
-    let needs_pilot = settings.tolerance == Tolerance::Scaled && settings.reltol < COARSE;
-    let mut pilot = None;
-    if needs_pilot {
-        let method = match (system.is_linear(), system.has_junctions()) {
-            (true, _) => Method::Trapezoidal,
-            (_, true) => Method::TrBdf2,
-            _ => Method::Rodas3,
-        };
-        let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
-        let mut run = Run::new(system, &coarse, None, None);
-        run.enough = enough(system, settings);
-        match run.run() {
-            Ok(()) => {
-                let Network { statistics, tracks, orders, .. } = run.network;
-                pilot = Some((run.largest, statistics, tracks, orders));
-            }
-            Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
-            // The real run will say what is wrong, if anything is.
-            Err(_) => {}
+    if settings.tolerance != Tolerance::Scaled || settings.reltol >= COARSE {
+        return Ok(None);
+    }
+    let method = match (system.is_linear(), system.has_junctions()) {
+        (true, _) => Method::Trapezoidal,
+        (_, true) => Method::TrBdf2,
+        _ => Method::Rodas3,
+    };
+    let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
+    let mut run = Run::new(system, &coarse, None, None);
+    run.enough = enough(system, settings);
+    match run.run() {
+        Ok(()) => {
+            let Network { statistics, tracks, orders, .. } = run.network;
+            Ok(Some(Seen { largest: run.largest, statistics, tracks, orders }))
         }
+        Err(failure) if failure.kind == FailureKind::Interrupted => Err(failure),
+        // The real run will say what is wrong, if anything is.
+        Err(_) => Ok(None),
     }
-    let magnitudes = pilot.as_ref().map(|(largest, ..)| largest.as_slice());
-    let mut run = Run::new(system, settings, magnitudes, Some(sink));
-    if let Some((_, statistics, tracks, orders)) = pilot {
-        let known = run.network.tracks.iter_mut().zip(&tracks);
-        known.for_each(|(track, known)| track.learn(known));
-        run.network.statistics.add_work(&statistics);
-        run.network.orders = orders;
-        run.network.statistics.pilot = statistics.accepted;
-    }
-    run.run()?;
-    Ok(run.network.statistics)
+}
+
+/// Goes on with what a pilot pass has found, and counts what it took.
+fn take_seen(network: &mut Network, seen: &Seen) {
+    network.tracks.iter_mut().zip(&seen.tracks).for_each(|(track, known)| track.learn(known));
+    network.statistics.add_work(&seen.statistics);
+    network.statistics.pilot = seen.statistics.accepted;
+    network.orders = seen.orders.clone();
+}
+
+/// a_i of each unknown, with the magnitudes of a pilot pass where there was one.
+fn absolute_tolerances(system: &System, settings: &Settings, seen: Option<&Seen>) -> Vec<f64> {
+    let of = |(k, unknown): (usize, &Unknown)| {
+        let literal = if unknown.voltage { settings.vntol } else { settings.abstol };
+        match (settings.tolerance, unknown.nominal, seen.map(|seen| seen.largest[k])) {
+            // A domain's nominal value is a guess: tanks know no pressures of megapascals.
+            (Tolerance::Scaled, Some(nominal), size) if nominal > 0.0 => {
+                settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
+            }
+            (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
+                literal.min(SMALL_PART * settings.reltol * size)
+            }
+            _ => literal,
+        }
+    };
+    system.unknowns.iter().enumerate().map(of).collect()
 }
 
 /// Magnitudes beyond which floors follow no longer.
@@ -194,6 +231,8 @@ struct Run<'a> {
     stored: Vec<u32>,
     state: State,
     next: State,
+    /// The unknowns on the left of a corner.
+    before: Vec<f64>,
     work: Work,
     controls: Controls,
     /// Whether any mode follows from the solution; its guards within a step, and those that have crossed.
@@ -221,37 +260,29 @@ struct Run<'a> {
     bound: Bound,
     /// Events since a moment, to see when they pile up.
     crowd: (f64, u32),
+    /// Of a run by exponentials.
+    far: Far,
 }
 
 impl<'a> Run<'a> {
     fn new(
         system: &'a System,
         settings: &'a Settings,
-        magnitudes: Option<&[f64]>,
+        seen: Option<&Seen>,
         sink: Option<&'a mut dyn Sink>,
     ) -> Run<'a> {
-        let network = Network::new(system, 0.0, settings.stop);
+        let mut network = Network::new(system, 0.0, settings.stop);
+        if let Some(seen) = seen {
+            take_seen(&mut network, seen);
+        }
         let (n, charges) = (system.equations(), system.charges());
         let rows = sink.map(|sink| Rows::new(&network, settings, sink));
-        let absolute = system.unknowns.iter().enumerate().map(|(k, unknown)| {
-            let literal = if unknown.voltage { settings.vntol } else { settings.abstol };
-            match (settings.tolerance, unknown.nominal, magnitudes.map(|m| m[k])) {
-                // A domain's nominal value is a guess: tanks know no pressures of megapascals.
-                (Tolerance::Scaled, Some(nominal), size) if nominal > 0.0 => {
-                    settings.reltol * size.unwrap_or(0.0).clamp(1e-2 * nominal, nominal)
-                }
-                (Tolerance::Scaled, _, Some(size)) if size > 0.0 => {
-                    literal.min(SMALL_PART * settings.reltol * size)
-                }
-                _ => literal,
-            }
-        });
         Run {
             inside: Inside::new(&network),
             rows,
             method: settings.method,
             enough: vec![],
-            absolute: absolute.collect(),
+            absolute: absolute_tolerances(system, settings, seen),
             largest: vec![0.0; n],
             weights: vec![0.0; n],
             rounding: Rounding::new(n),
@@ -265,6 +296,7 @@ impl<'a> Run<'a> {
             stored: stored(system),
             state: State::new(0.0, n, charges),
             next: State::new(0.0, n, charges),
+            before: vec![0.0; n],
             work: Work::new(n, charges),
             controls: Controls::new(system.modes.len()),
             watches: system.modes.iter().any(|mode| mode.clock.is_none()),
@@ -282,6 +314,7 @@ impl<'a> Run<'a> {
             detour: 0,
             bound: Bound::default(),
             crowd: (0.0, 0),
+            far: Far::default(),
             network,
             settings,
         }
@@ -328,7 +361,10 @@ impl<'a> Run<'a> {
         let mut power = self.method.error_power();
         let limit = self.settings.hmax.unwrap_or(f64::INFINITY).min(self.sight);
         let limit = limit.min(self.network.memories.longest_step());
-        let planned = self.before_wall(self.h).min(limit);
+        let planned = match self.far_step(remaining) {
+            Some(far) => far,
+            None => self.before_wall(self.h).min(limit),
+        };
         let mut h = planned;
         let mut bounded = false;
         let mut search = Search::default();
@@ -384,7 +420,13 @@ impl<'a> Run<'a> {
                     self.network.statistics.rejected.error += 1;
                     cuts.note(h, Reason::Error(self.worst_error(), error));
                     self.see_rounding(error);
-                    h *= size::after_error(error, power);
+                    h = match self.method {
+                        Method::Exponential => match self.cut_far(h) {
+                            Some(shorter) => shorter,
+                            None => return self.leave_exponentials().map(|()| (false, None)),
+                        },
+                        _ => h * size::after_error(error, power),
+                    };
                     Cut::NoConvergence { worst: self.worst_error() }
                 }
                 Err(Cut::NonFinite { .. }) if self.slope_by_time_is_infinite() => {
@@ -395,6 +437,9 @@ impl<'a> Run<'a> {
                     statistics.method = self.method.name().into();
                     statistics.reason = "a slope by time is infinite".into();
                     continue;
+                }
+                Err(_) if self.method == Method::Exponential => {
+                    return self.leave_exponentials().map(|()| (false, None));
                 }
                 Err(cut) => {
                     let rejected = &mut self.network.statistics.rejected;
@@ -490,7 +535,13 @@ impl<'a> Run<'a> {
         // Of index 2 currents are rates of what is solved for, and take all that iterations leave.
         let left = if self.index2 { 0.0 } else { UNCONFIRMED * error.max(NEGLIGIBLE) };
         self.work.unconfirmed = left;
-        let factor = self.factor(error, h, failed, power);
+        let factor = match self.method {
+            Method::Exponential => {
+                self.learn_far(h, failed);
+                1.0
+            }
+            _ => self.factor(error, h, failed, power),
+        };
         self.learn_first(factor * h, failed);
         // A step that was clipped says little against the size that had been planned.
         self.h = if clipped && !failed { planned.max(factor * h) } else { factor * h };

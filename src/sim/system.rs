@@ -204,6 +204,18 @@ impl System {
         self.charge_devices.len()
     }
 
+    /// The unknowns that output columns speak of; all of them where a column has a law.
+    pub(crate) fn observed(&self) -> Vec<u32> {
+        let mut observed = match self.law_columns.is_empty() {
+            true => self.plain_outputs.iter().map(|(_, unknown)| *unknown).collect(),
+            false => (0..self.equations() as u32).collect(),
+        };
+        let observed: &mut Vec<u32> = &mut observed;
+        observed.sort_unstable();
+        observed.dedup();
+        std::mem::take(observed)
+    }
+
     /// Whether any law is an exponential junction.
     pub fn has_junctions(&self) -> bool {
         self.groups.iter().any(|group| group.junction.is_some())

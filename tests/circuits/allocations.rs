@@ -37,3 +37,12 @@ fn steps_of_every_method_take_no_memory() {
         }
     }
 }
+
+#[test]
+fn steps_by_exponentials_take_no_memory_either() {
+    let deck = "a\nV1 in 0 PULSE(0 5 1u 1u 1u 20u 50u)\nR1 in out 1k\nC1 out 0 1u\nR2 out more 1k\nC2 more 0 20n\n\
+                .tran 10u 1\n.options method=exponential\n";
+    let (few, some) = (asked(deck, "10m"), asked(deck, "20m"));
+    assert!(some.1 > few.1 + 200, "{} and {} steps", few.1, some.1);
+    assert_eq!(some.0, few.0, "{} and {} steps", few.1, some.1);
+}

@@ -11,6 +11,7 @@ mod sensitivity;
 mod measures;
 mod condensed;
 mod meshes;
+mod exponential;
 mod difficult_decks;
 mod decks_in_ngspice;
 mod expressions_in_ngspice;

@@ -1,11 +1,14 @@
 //! Integration methods: each takes one step of a given size and estimates its local error.
 
+pub mod exponential;
 pub mod gear2;
 pub mod history;
 pub mod rodas;
+mod small;
 pub mod trapezoidal;
 pub mod trbdf2;
 
+use self::exponential::Space;
 use self::history::History;
 use super::network::Network;
 use super::newton::{Cut, Scratch};
@@ -26,6 +29,8 @@ pub enum Method {
     Trapezoidal,
     /// BDF2 with variable steps, order 2.
     Gear2,
+    /// The exact solution of linear equations driven along straight lines, in a space of few dimensions.
+    Exponential,
     /// Rosenbrock, order 3, with straight lines between the ends of its steps: of pilot passes.
     Rodas3,
 }
@@ -54,6 +59,7 @@ pub const METHODS: &[MethodRow] = &[
     MethodRow { name: "trbdf2", aliases: &[], method: Method::TrBdf2, order: 2, source: "M. E. Hosea, L. F. Shampine, Appl. Numer. Math. 20:21-37, 1996" },
     MethodRow { name: "trap", aliases: &["trapezoidal"], method: Method::Trapezoidal, order: 2, source: "L. W. Nagel, SPICE2, ERL-M520, 1975" },
     MethodRow { name: "gear", aliases: &["gear2", "bdf2"], method: Method::Gear2, order: 2, source: "E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, 1993, III.5" },
+    MethodRow { name: "exponential", aliases: &["krylov", "expm"], method: Method::Exponential, order: 0, source: "J. van den Eshof, M. Hochbruck, SIAM J. Sci. Comput. 27:1438-1457, 2006" },
 ];
 
 impl Method {
@@ -125,6 +131,8 @@ pub(crate) struct Dense {
     degrees: [usize; 2],
     /// Whether polynomials by the past are still to be made.
     pending: bool,
+    /// Where a run goes by exponentials: unknowns between are what this says.
+    pub space: Option<Box<Space>>,
 }
 
 /// What is asked of polynomials, where that is little.
@@ -143,6 +151,14 @@ impl Dense {
             by_past: false,
             degrees: [0; 2],
             pending: false,
+            space: None,
+        }
+    }
+
+    /// Looks at a part of the step, where that takes more than polynomials.
+    pub fn look_at(&mut self, theta: f64) {
+        if let Some(space) = &mut self.space {
+            space.look_at(theta);
         }
     }
 
@@ -220,13 +236,19 @@ impl Dense {
         self.pending = asked.is_some();
     }
 
-    /// The unknowns at a part of the step.
+    /// The unknowns at a part of the step, which is [looked at](Dense::look_at).
     pub fn unknowns(&self, theta: f64, from: &State, to: &State, out: &mut [f64]) {
+        if let Some(space) = &self.space {
+            return space.unknowns(out);
+        }
         interpolate(theta, &from.x, &to.x, &self.x, out);
     }
 
-    /// One unknown at a part of the step; what rests does so to the last digit.
+    /// One unknown at a part of the step, which is [looked at](Dense::look_at); what rests does so to the last digit.
     pub fn unknown(&self, i: usize, theta: f64, from: &State, to: &State) -> f64 {
+        if let Some(space) = &self.space {
+            return space.unknown(i);
+        }
         one(i, theta, &from.x, &to.x, &self.x)
     }
 
@@ -342,6 +364,7 @@ pub(crate) fn step(
         Method::Rodas5p => rodas::step(&rodas::RODAS5P, network, from, to, weights, work),
         Method::Trapezoidal => trapezoidal::step(network, from, to, weights, work),
         Method::Gear2 => gear2::step(network, from, to, weights, work),
+        Method::Exponential => exponential::step(network, from, to, weights, work),
         Method::TrBdf2 | Method::Auto => trbdf2::step(network, from, to, weights, work),
     }
 }

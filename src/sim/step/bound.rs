@@ -121,7 +121,7 @@ impl Run<'_> {
         found
     }
 
-    fn go_on_with(&mut self, method: Method, reason: &str) {
+    pub(super) fn go_on_with(&mut self, method: Method, reason: &str) {
         (self.method, self.home) = (method, method);
         self.network.statistics.method.replace_range(.., method.name());
         self.network.statistics.reason.replace_range(.., reason);

@@ -93,6 +93,7 @@ impl Run<'_> {
         let span = self.distance();
         let careful = (0.1 * span).min(self.until_charges_change());
         let known = self.first.present.and_then(|place| self.first.known[place].1);
+        self.begin_far(known);
         let most = known.map_or(careful, |did| did.min(careful));
         self.h = (0.5 * self.h).min(most).max(self.smallest);
     }

@@ -4,6 +4,7 @@ use super::{Run, count_system, past};
 use crate::circuit::Waveform;
 use crate::linear::Singular;
 use crate::sim::explain::{Failure, Moment, failure};
+use crate::sim::methods::exponential::{self, Space};
 use crate::sim::methods::{self, Method};
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::{self, State, Trouble};
@@ -76,8 +77,18 @@ impl Run<'_> {
             self.rows_as_stated()?;
         }
         let (method, reason) = methods::choose(&self.network, self.index2);
+        let far = exponential::suits(self.network.system, self.settings);
+        if far && self.index2 {
+            self.learn_magnitudes()?;
+        }
         let (method, reason) = match self.settings.method {
+            _ if far && !self.index2 => {
+                let space = Space::new(self.network.system, self.settings);
+                self.work.dense.space = Some(Box::new(space));
+                (Method::Exponential, exponential::STRAIGHT)
+            }
             Method::Auto => (method, reason),
+            Method::Exponential => (method, exponential::UNFIT),
             asked if asked.is_rosenbrock() && self.index2 => (method, reason),
             asked => (asked, "asked for"),
         };
@@ -94,6 +105,9 @@ impl Run<'_> {
     /// Consistent values for the charges of `state`.
     pub(super) fn restart(&mut self, moment: Moment) -> Result<(), Failure> {
         self.leave_bound();
+        if let Some(space) = &mut self.work.dense.space {
+            space.begin(self.state.t);
+        }
         self.work.history.forget();
         self.rounding.forget();
         self.work.scratch.forget_bend();
@@ -347,18 +361,15 @@ impl Run<'_> {
         self.network.pass_corner(self.state.t, self.smallest);
         self.first.corner(&self.network, self.state.t, self.smallest);
         let events = self.network.statistics.events;
-        let before = self.rows.is_some().then(|| self.state.x.clone());
+        let mut before = std::mem::take(&mut self.before);
+        before.clone_from(&self.state.x);
         self.restart(Moment::Restart)?;
         self.settle_memories(Moment::Restart)?;
         self.shorten();
         // A second row only where something jumped.
-        let jumped = before.is_some_and(|before| {
-            before
-                .iter()
-                .zip(&self.state.x)
-                .zip(&self.weights)
-                .any(|((a, b), weight)| (a - b).abs() > *weight)
-        });
+        let mut both = before.iter().zip(&self.state.x).zip(&self.weights);
+        let jumped = both.any(|((a, b), weight)| (a - b).abs() > *weight);
+        self.before = before;
         if jumped || self.network.statistics.events != events { self.row_here() } else { Ok(()) }
     }
 }
