@@ -183,6 +183,9 @@ const SMALL_PART: f64 = 1e-3;
 
 /// A pilot pass ends after so many steps: what magnitudes it has seen until then will do.
 const PILOT_STEPS: u64 = 1000;
+/// and after so few where every unknown has come to this part of its magnitude that will do.
+const FEW_PILOT_STEPS: u64 = 50;
+const MOVED: f64 = 1e-9;
 
 /// Where the first step after a corner would have to be less than this part of the way to the next one, what happens
 /// in it counts as a jump.
@@ -344,9 +347,17 @@ impl<'a> Run<'a> {
 
     /// Whether a pilot pass may end: nothing that it is asked for changes any more, or it has been long.
     fn has_seen_enough(&self) -> bool {
-        let known = || self.largest.iter().zip(&self.enough).all(|(most, enough)| most >= enough);
-        // The ranges of guards are asked for, too.
-        self.network.statistics.accepted >= PILOT_STEPS || (!self.watches && known())
+        let all_of = |part: f64| {
+            self.largest.iter().zip(&self.enough).all(|(most, enough)| *most >= part * enough)
+        };
+        match self.network.statistics.accepted {
+            PILOT_STEPS.. => true,
+            // The ranges of guards are asked for, too.
+            _ if self.watches => false,
+            // Where all have moved, floors that are too small cost less than a longer pass.
+            FEW_PILOT_STEPS.. => all_of(MOVED),
+            _ => all_of(1.0),
+        }
     }
 
     /// Time to the next corner or the end.
