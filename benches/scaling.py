@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""Cost of a step and of all before it against the number of unknowns: scaling.py [BINARY] [--only chain|bus|mesh] [--most N] [--peer ngspice]
+"""Cost of a run and of a step against the number of unknowns: scaling.py [BINARY] [--only chain|bus|mesh] [--most N] [--peer ngspice]
 
   chain  an RC ladder
   bus    RC branches side by side at one node, which a source feeds through a resistor
   mesh   a square grid of resistors, a capacitor at every node
 
-From 10 to 1e6 unknowns (meshes to 3e5), each deck with a step limit that binds. Each is run over one time and over a longer one; what the longer run
-costs more, for each step it takes more, is a step's cost; what is left of the shorter run is all else: reading, setting up, the pilot pass and the
-short steps of the start. CPU time of the
-whole process (user + system), the least of n runs; peak memory of the longer run. The last lines are exponents p of cost ~ unknowns^p, from
-the largest three sizes. A step whose cost the differences between runs hide is shown as -, and peaks below this script's own (some 15 to 30 MiB) are
-hidden by it. With --peer, the peer's peak memory on the same decks (to --peer-most unknowns) stands beside.
+From 10 to 1e6 unknowns (meshes to 3e5). A run is one of 60 µs with rows every µs, by the method that bondspice takes by itself: CPU time of the whole
+process (user + system), the least of n runs, and its peak memory. A step is one of the trapezoidal rule with a limit that binds: what a longer run
+costs more, for each step it takes more; one whose cost the differences between runs hide is shown as -, and --no-steps leaves it out. Peaks below
+this script's own (some 15 to 30 MiB) are hidden by it. The last lines are exponents p of cost ~ unknowns^p, from the largest three sizes. With --peer,
+the peer's peak memory on the same decks (to --peer-most unknowns) stands beside.
 """
 import argparse
 import json
@@ -72,23 +71,30 @@ def run(command, n=1):
     return *best, said
 
 
-def measure(binary, scratch, kind, size, n):
+FEW = 60
+
+
+def simulate(binary, scratch, deck, n, *options):
+    """CPU seconds, peak MiB and counters of a run."""
+    command = [binary, "simulate", deck, "-o", os.path.join(scratch, "out.raw"), "--stats", "json", *options]
+    seconds, peak, said = run(command, n)
+    return seconds, peak, json.loads(next(line for line in said.splitlines() if line.startswith(b"{")))
+
+
+def measure(binary, scratch, kind, size, n, steps):
+    """Unknowns, seconds and MiB of a run, seconds of a step, and the deck."""
     node, body = KINDS[kind](size)
     deck = os.path.join(scratch, "deck.cir")
-    # As many steps more as take a measurable time, whatever the size.
-    few = 60
-    more = few + max(100, min(100_000, 20_000_000 // size))
-    results = []
-    for steps in (few, more):
-        write_deck(deck, body, node, steps)
-        command = [binary, "simulate", deck, "-o", os.path.join(scratch, "out.raw"), "--stats", "json"]
-        seconds, peak, said = run(command, n)
-        stats = json.loads(next(line for line in said.splitlines() if line.startswith(b"{")))
-        results.append((seconds, peak, stats))
-    (short, _, first), (long, peak, last) = results
-    step = (long - short) / (last["accepted"] - first["accepted"])
-    start = short - max(step, 0.0) * first["accepted"]
-    return last["equations"], step, start, peak, deck
+    longer = os.path.join(scratch, "longer.cir")
+    write_deck(deck, body, node, FEW)
+    seconds, peak, stats = simulate(binary, scratch, deck, n)
+    step = 0.0
+    if steps:
+        # As many steps more as take a measurable time, whatever the size.
+        write_deck(longer, body, node, FEW + max(100, min(100_000, 20_000_000 // size)))
+        short, long = (simulate(binary, scratch, path, n, "--option", "method=trap") for path in (deck, longer))
+        step = (long[0] - short[0]) / (long[2]["accepted"] - short[2]["accepted"])
+    return stats["equations"], seconds, step, peak, deck
 
 
 def exponent(points):
@@ -105,12 +111,13 @@ def main():
     parser.add_argument("binary", nargs="?", default="target/release/bondspice")
     parser.add_argument("--only", choices=KINDS)
     parser.add_argument("--most", type=float, default=math.inf)
+    parser.add_argument("--no-steps", action="store_true")
     parser.add_argument("--peer")
     parser.add_argument("--peer-most", type=float, default=1e4)
     parser.add_argument("-n", type=int, default=2)
     args = parser.parse_args()
     peer_head = "| peer's MiB " if args.peer else ""
-    print(f"| circuit | unknowns | µs a step | ns a step, an unknown | all else, s | MiB {peer_head}|")
+    print(f"| circuit | unknowns | a run, s | MiB | µs a step | ns a step, an unknown {peer_head}|")
     print("|---" * (7 if args.peer else 6) + "|")
     exponents = []
     for kind in KINDS if args.only is None else [args.only]:
@@ -119,19 +126,19 @@ def main():
             if size > min(MOST[kind], args.most):
                 continue
             with tempfile.TemporaryDirectory() as scratch:
-                unknowns, step, start, peak, deck = measure(args.binary, scratch, kind, size, args.n)
+                unknowns, seconds, step, peak, deck = measure(args.binary, scratch, kind, size, args.n, not args.no_steps)
                 cell = ""
                 if args.peer:
                     wanted = size <= args.peer_most
                     peer = f"{run([args.peer, '-b', '-r', os.path.join(scratch, 'peer.raw'), deck])[1]:.0f}" if wanted else "-"
                     cell = f" {peer} |"
-            points.append((unknowns, step, start, peak))
+            points.append((unknowns, seconds, peak, step))
             costs = f"{step * 1e6:.3g} | {step * 1e9 / unknowns:.3g}" if step > 0 else "- | -"
-            print(f"| {kind} | {unknowns} | {costs} | {start:.3g} | {peak:.0f} |{cell}", flush=True)
+            print(f"| {kind} | {unknowns} | {seconds:.3g} | {peak:.0f} | {costs} |{cell}", flush=True)
         if len(points) >= 3:
             of = lambda k: exponent([(p[0], p[k]) for p in points])
             exponents.append(f"| {kind} | {of(1):.2f} | {of(2):.2f} | {of(3):.2f} |")
-    print("\n| exponents of the largest three | a step | all else | memory |")
+    print("\n| exponents of the largest three | a run | memory | a step |")
     print("|---|---|---|---|")
     print("\n".join(exponents))
 

@@ -255,3 +255,16 @@ pub struct Stamps {
     /// Names and places, indexed by [`DeviceId`].
     pub devices: Arc<Vec<DeviceLabel>>,
 }
+
+impl Stamps {
+    /// Gives back what a system has been compiled from: names of columns stay.
+    pub fn give_back(&mut self) {
+        self.unknowns = vec![];
+        self.conductances = vec![];
+        self.charges = vec![];
+        self.laws = vec![];
+        self.sources = vec![];
+        self.memories = vec![];
+        self.modes = vec![];
+    }
+}

@@ -285,6 +285,15 @@ impl Run {
         }
     }
 
+    /// Gives back what the circuit was made of, unless it may have to be made again: with other values, or with all of its
+    /// unknowns.
+    pub fn give_back(&mut self) {
+        let over_time = matches!(self.analysis, Analysis::Transient { .. });
+        if over_time && self.deck.is_none() && self.steps.is_empty() && !self.system.condensed {
+            self.stamps.give_back();
+        }
+    }
+
     /// Of a run whose rows nobody keeps: those between the ends of steps are not made where no measure asks for them.
     pub fn keep_no_rows(&mut self) {
         let ends = self.measures().all(|measure| measure.kind.is_of_end());

@@ -130,6 +130,7 @@ fn go(arguments: &Arguments, run: &mut Run, session: &mut Session) -> Result<Exi
     let bar = Bar::new(session.global.quiet);
     let progress = bar.clone().map(|bar| Arc::new(move |part| bar.show(part)) as Progress);
     run.watch(watch::stop_flag(), progress);
+    run.give_back();
     let (result, taken) = run.go_measured(&mut output);
     if let Some(bar) = bar {
         bar.clear();

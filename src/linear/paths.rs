@@ -56,16 +56,24 @@ pub fn order(
             break;
         }
         left -= chosen;
+        let mut touched = vec![];
         for node in order[before..].iter().map(|node| *node as usize) {
             gone[node] = true;
             let ends = std::mem::take(&mut neighbours[node]);
             for &end in &ends {
-                let list = &mut neighbours[end as usize];
-                list.retain(|other| *other as usize != node);
                 let others = ends.iter().filter(|other| **other != end);
-                let new = others.filter(|other| !list.contains(other)).copied().next();
-                list.extend(new);
+                neighbours[end as usize].extend(others);
+                touched.push(end);
             }
+        }
+        // Once for each, not once for each of its neighbours: of a bus all may have gone.
+        touched.sort_unstable();
+        touched.dedup();
+        for node in touched {
+            let list = &mut neighbours[node as usize];
+            list.retain(|other| !gone[*other as usize]);
+            list.sort_unstable();
+            list.dedup();
         }
     }
     let others: Vec<u32> = (0..n as u32).filter(|node| !gone[*node as usize]).collect();
@@ -99,6 +107,15 @@ mod tests {
         assert_eq!(order[..32], (0..64).step_by(2).collect::<Vec<u32>>());
         assert_eq!(order[32..48], (1..64).step_by(4).collect::<Vec<u32>>());
         assert_eq!(order.len(), 64);
+    }
+
+    #[test]
+    fn the_nodes_of_a_star_go_at_once() {
+        // A hub that lists its neighbours anew for each of them would take minutes.
+        const ENDS: u32 = 300_000;
+        let order = order(ENDS as usize + 1, (1..=ENDS).map(|k| (0, k)), backwards).unwrap();
+        assert_eq!(order.len(), ENDS as usize + 1);
+        assert_eq!(order[ENDS as usize], 0);
     }
 
     #[test]

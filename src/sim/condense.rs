@@ -377,17 +377,18 @@ impl<'a> Condenser<'a> {
 
     /// The stamps of what is left.
     fn finish(self) -> Stamps {
-        let stamps = self.stamps;
-        let kept: Vec<u32> =
-            (0..self.gone.len() as u32).filter(|c| !self.gone[*c as usize]).collect();
+        let Condenser { stamps, rows, gone, items, columns, readers, .. } = self;
+        // What is large makes room for what is made of it, piece by piece.
+        drop((columns, readers));
+        let kept: Vec<u32> = (0..gone.len() as u32).filter(|c| !gone[*c as usize]).collect();
         let nodes = kept.iter().filter(|c| (**c as usize) < stamps.nodes).count();
         // Each unknown keeps the equation of its number where that is left; the others are dealt out.
-        let alive = |r: &u32| self.rows[*r as usize].is_some();
-        let gone = |r: &u32| self.gone[*r as usize];
-        let mut spare = (0..self.rows.len() as u32).filter(|r| alive(r) && gone(r));
+        let alive = |r: &u32| rows[*r as usize].is_some();
+        let left_over = |r: &u32| gone[*r as usize];
+        let mut spare = (0..rows.len() as u32).filter(|r| alive(r) && left_over(r));
         let order: Vec<u32> =
             kept.iter().filter_map(|c| if alive(c) { Some(*c) } else { spare.next() }).collect();
-        let (column_of, row_of) = (places(&kept, self.gone.len()), places(&order, self.gone.len()));
+        let (column_of, row_of) = (places(&kept, gone.len()), places(&order, gone.len()));
         let column = |c: u32| UnknownId(column_of[c as usize]);
         let at = |r: UnknownId| UnknownId(row_of[r.0 as usize]);
         let into = |terms: &Terms| terms.iter().map(|(row, factor)| (at(*row), *factor)).collect();
@@ -404,8 +405,7 @@ impl<'a> Condenser<'a> {
         let mut conductances = vec![];
         let mut of_sources = vec![Terms::new(); stamps.sources.len()];
         let mut of_laws = vec![Terms::new(); stamps.laws.len()];
-        for (r, row) in
-            order.iter().filter_map(|r| self.rows[*r as usize].as_ref().map(|row| (*r, row)))
+        for (r, row) in order.iter().filter_map(|r| rows[*r as usize].as_ref().map(|row| (*r, row)))
         {
             let own = at(UnknownId(r));
             conductances.extend(row.terms.iter().map(|(c, value)| (own, column(*c), *value)));
@@ -413,12 +413,12 @@ impl<'a> Condenser<'a> {
             row.laws.iter().for_each(|(l, factor)| of_laws[*l as usize].push((own, *factor)));
         }
         let left = |values: &Terms| -> Terms {
-            let left = values.iter().filter(|(node, _)| !self.gone[node.0 as usize]);
+            let left = values.iter().filter(|(node, _)| !gone[node.0 as usize]);
             left.map(|(node, value)| (column(node.0), *value)).collect()
         };
         // Corners of sources that nothing follows from end no step.
         let sources = stamps.sources.iter().zip(of_sources).filter(|(_, into)| !into.is_empty());
-        let mut items = self.items.iter();
+        let mut items = items.into_iter();
         let laws = stamps.laws.iter().zip(of_laws).zip(items.by_ref());
         let laws = laws.filter(|((_, into), _)| !into.is_empty()).map(|((stamp, into), item)| {
             let mut junction = stamp.junction;
