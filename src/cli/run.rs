@@ -294,11 +294,13 @@ impl Run {
         }
     }
 
-    /// Of a run whose rows nobody keeps: those between the ends of steps are not made where no measure asks for them.
+    /// Of a run whose rows nobody keeps: where measures are of its end alone, none is made but the last.
     pub fn keep_no_rows(&mut self) {
         let ends = self.measures().all(|measure| measure.kind.is_of_end());
+        let ends = ends && self.circuit.harmonics.is_empty();
         if let Some(settings) = self.settings.as_mut().filter(|_| ends) {
-            settings.between = !self.circuit.harmonics.is_empty();
+            settings.between = false;
+            settings.rows = Interval::Times(vec![settings.stop]);
         }
     }
 

@@ -190,7 +190,7 @@ impl<'a> Rows<'a> {
 
     /// Whether rows are made at every step, to be written or measured.
     pub fn follows_steps(&self) -> bool {
-        self.interval == Interval::Steps || self.watched > 0
+        self.interval == Interval::Steps || (self.watched > 0 && self.between)
     }
 
     /// Whether rows are written at times of their own.

@@ -150,8 +150,9 @@ pub(crate) struct Space {
     matrix: Vec<f64>,
     /// Estimates of the error at h, h/2, h/4 …, of coordinates.
     errors: Vec<f64>,
-    /// Coordinates at the time that is looked at.
+    /// Coordinates at the time that is looked at, and the unknowns there.
     y: Vec<f64>,
+    now: Vec<f64>,
 }
 
 impl Space {
@@ -190,6 +191,7 @@ impl Space {
             matrix: vec![0.0; MOST * MOST],
             errors: Vec::with_capacity(64),
             y: vec![0.0; MOST],
+            now: vec![0.0; count],
         }
     }
 
@@ -212,20 +214,38 @@ impl Space {
     /// Looks at a part of the last step.
     pub fn look_at(&mut self, theta: f64) {
         self.small.at(theta.clamp(0.0, 1.0), self.length, &mut self.y);
+        self.sum_up();
+    }
+
+    /// Looks at h/2ᵏ.
+    fn look_at_half(&mut self, k: usize) {
+        for (y, power) in self.y.iter_mut().zip(self.small.first_column(k)) {
+            *y = self.length * power;
+        }
+        self.sum_up();
+    }
+
+    /// The unknowns at the time that is looked at, vector by vector.
+    fn sum_up(&mut self) {
+        self.now.fill(0.0);
+        let vectors = self.seen.chunks_exact(self.asked.len().max(1));
+        for (y, vector) in self.y[..self.size].iter().zip(vectors) {
+            take(-y, vector, &mut self.now);
+        }
     }
 
     /// An unknown at the time that is looked at; 0 where it is not asked for.
     pub fn unknown(&self, unknown: usize) -> f64 {
         match self.place[unknown] {
             u32::MAX => 0.0,
-            place => combine(&self.seen, self.asked.len(), place as usize, &self.y[..self.size]),
+            place => self.now[place as usize],
         }
     }
 
     /// All unknowns that are asked for, at the time that is looked at.
     pub fn unknowns(&self, out: &mut [f64]) {
-        for unknown in self.asked.iter().map(|unknown| *unknown as usize) {
-            out[unknown] = self.unknown(unknown);
+        for (unknown, now) in self.asked.iter().zip(&self.now) {
+            out[*unknown as usize] = *now;
         }
     }
 
@@ -420,7 +440,7 @@ impl Space {
             return f64::INFINITY;
         }
         self.size = m;
-        self.allow(from);
+        self.allow();
         let count = self.asked.len();
         let next = &self.seen[m * count..(m + 1) * count];
         let shares = next.iter().zip(&self.allowed).map(|(next, allowed)| next.abs() / allowed);
@@ -457,40 +477,29 @@ impl Space {
     }
 
     /// What each unknown may be off, with what it is at the end of this step.
-    fn allow(&mut self, from: &State) {
+    fn allow(&mut self) {
+        self.look_at_half(0);
         let mut top = [f64::MIN_POSITIVE; 2];
-        let count = self.asked.len();
-        self.y.clear();
-        self.y.extend(self.small.first_column(0).map(|y| self.length * y));
-        for i in 0..count {
-            let before = from.x[self.asked[i] as usize].abs();
-            let end = combine(&self.seen, count, i, &self.y).abs();
-            self.allowed[i] = self.largest[i].max(before).max(end);
-            let top = &mut top[usize::from(self.voltage[i])];
-            *top = top.max(self.allowed[i]);
+        let sizes = self.largest.iter().zip(&self.now).zip(&self.voltage);
+        for (allowed, ((largest, end), voltage)) in self.allowed.iter_mut().zip(sizes) {
+            *allowed = largest.max(end.abs());
+            let top = &mut top[usize::from(*voltage)];
+            *top = top.max(*allowed);
         }
-        for ((allowed, least), voltage) in
-            self.allowed.iter_mut().zip(&self.least).zip(&self.voltage)
-        {
-            let part = ROUNDING.max(SMALL * self.reltol);
+        let part = ROUNDING.max(SMALL * self.reltol);
+        let kinds = self.least.iter().zip(&self.voltage);
+        for (allowed, (least, voltage)) in self.allowed.iter_mut().zip(kinds) {
             let floor = part * top[usize::from(*voltage)];
             *allowed = self.reltol * *allowed + least.max(floor);
         }
-        self.y.resize(MOST, 0.0);
     }
 
     /// How far the unknowns have moved at h/2ᵏ, in parts of what they may be off.
     fn moved(&mut self, k: usize, from: &State) -> f64 {
-        let count = self.asked.len();
-        self.y.clear();
-        self.y.extend(self.small.first_column(k).map(|y| self.length * y));
-        let mut most: f64 = 0.0;
-        for (i, (unknown, allowed)) in self.asked.iter().zip(&self.allowed).enumerate() {
-            let x = combine(&self.seen, count, i, &self.y);
-            most = most.max((x - from.x[*unknown as usize]).abs() / allowed);
-        }
-        self.y.resize(MOST, 0.0);
-        most
+        self.look_at_half(k);
+        let all = self.asked.iter().zip(&self.now).zip(&self.allowed);
+        let moved = all.map(|((k, now), allowed)| (now - from.x[*k as usize]).abs() / allowed);
+        moved.fold(0.0, f64::max)
     }
 
     /// Charges at the end of the step, and all that follows from them.
@@ -534,12 +543,6 @@ fn scales(system: &System) -> Vec<f64> {
         }
     };
     (0..system.charges()).map(scale).collect()
-}
-
-/// The part `place` of a sum of vectors of `count` parts each.
-fn combine(vectors: &[f64], count: usize, place: usize, coordinates: &[f64]) -> f64 {
-    let parts = vectors[place.min(vectors.len())..].iter().step_by(count.max(1));
-    coordinates.iter().zip(parts).map(|(y, part)| y * part).sum()
 }
 
 /// y −= factor·x
