@@ -10,6 +10,7 @@ mod cholesky;
 mod choose;
 mod components;
 mod degree;
+mod elimination;
 mod factors;
 mod field;
 mod flat;
@@ -31,6 +32,7 @@ mod tests;
 
 pub use cholesky::{Orders, dot};
 pub use components::components;
+pub use elimination::eliminate;
 pub use factors::Factors;
 pub use field::{Complex, Field, Prime, Prime61, Prime62};
 pub use lu::{Lu, SMALL, Trouble, backward_error};

@@ -8,7 +8,7 @@
 use super::network::Network;
 use super::newton::{Cut, Scratch};
 use super::op::State;
-use crate::linear::{Pattern, Singular};
+use crate::linear::{Pattern, Singular, eliminate};
 
 /// A sum of charges that keeps its value.
 #[derive(Clone, Debug)]
@@ -145,10 +145,11 @@ pub(crate) fn settle(
                 matrix[row * m + column] = (there - here) / change;
             }
         }
-        let Some(step) = eliminate(matrix, misfit) else {
+        let mut step = misfit;
+        if !eliminate(m, &mut matrix, 1, &mut step) {
             state.copy_from(&kept);
             return;
-        };
+        }
         for (tie, step) in ties.iter().zip(step) {
             targets[tie.charge] -= step;
         }
@@ -158,35 +159,6 @@ pub(crate) fn settle(
             return;
         }
     }
-}
-
-/// Gaussian elimination with partial pivoting of a small system.
-fn eliminate(mut a: Vec<f64>, mut b: Vec<f64>) -> Option<Vec<f64>> {
-    let m = b.len();
-    for k in 0..m {
-        let pivot = (k..m).max_by(|i, j| a[i * m + k].abs().total_cmp(&a[j * m + k].abs()))?;
-        if a[pivot * m + k] == 0.0 || !a[pivot * m + k].is_finite() {
-            return None;
-        }
-        for column in 0..m {
-            a.swap(k * m + column, pivot * m + column);
-        }
-        b.swap(k, pivot);
-        for row in k + 1..m {
-            let factor = a[row * m + k] / a[k * m + k];
-            for column in k..m {
-                a[row * m + column] -= factor * a[k * m + column];
-            }
-            b[row] -= factor * b[k];
-        }
-    }
-    for k in (0..m).rev() {
-        for column in k + 1..m {
-            b[k] -= a[k * m + column] * b[column];
-        }
-        b[k] /= a[k * m + k];
-    }
-    b.iter().all(|value| value.is_finite()).then_some(b)
 }
 
 /// The one combination of these rows that vanishes, by elimination with full pivoting.

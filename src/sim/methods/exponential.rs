@@ -14,10 +14,10 @@
 //! Lengths are energies: charge k counts as q²/c with the c that it meets, so that flows into capacitors and efforts on
 //! inductors are weighed as physics does, and algebraic unknowns, which hold none, do not count at all.
 
-use super::small::{Exponentials, invert};
+use super::small::{Exponentials, identity};
 use super::{Work, trbdf2};
 use crate::circuit::Waveform;
-use crate::linear::dot;
+use crate::linear::{dot, eliminate};
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Frozen, correct_frozen};
 use crate::sim::op::State;
@@ -429,7 +429,9 @@ impl Space {
                 self.matrix[row * m + column] = if inside { entry } else { 0.0 };
             }
         }
-        if !invert(m, &mut self.matrix[..square], &mut self.inverse[..square]) {
+        let inverse = &mut self.inverse[..square];
+        identity(m, inverse);
+        if !eliminate(m, &mut self.matrix, m, inverse) {
             return f64::INFINITY;
         }
         for (k, (a, inverse)) in self.matrix.iter_mut().zip(&self.inverse[..square]).enumerate() {

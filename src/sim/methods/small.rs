@@ -129,7 +129,8 @@ impl Exponentials {
     }
 }
 
-fn identity(size: usize, a: &mut [f64]) {
+/// The matrix of `size` rows that changes nothing.
+pub(crate) fn identity(size: usize, a: &mut [f64]) {
     a.fill(0.0);
     a.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = 1.0);
 }
@@ -151,39 +152,6 @@ fn apply(size: usize, a: &[f64], x: &[f64], y: &mut [f64]) {
     for (row, y) in a.chunks_exact(size).zip(y) {
         *y = row.iter().zip(x).map(|(a, x)| a * x).sum();
     }
-}
-
-/// a⁻¹ by Gaussian elimination with partial pivoting; `a` is used up. False where it is singular.
-pub(crate) fn invert(size: usize, a: &mut [f64], inverse: &mut [f64]) -> bool {
-    identity(size, inverse);
-    for k in 0..size {
-        let size_of = |a: &[f64], row: usize| a[row * size + k].abs();
-        let best = (k..size).max_by(|i, j| size_of(a, *i).total_cmp(&size_of(a, *j)));
-        let Some(best) = best.filter(|best| size_of(a, *best) > 0.0) else { return false };
-        for matrix in [&mut *a, &mut *inverse] {
-            let (above, below) = matrix.split_at_mut((k + 1) * size);
-            if best > k {
-                let other = &mut below[(best - k - 1) * size..(best - k) * size];
-                above[k * size..].swap_with_slice(other);
-            }
-        }
-        let pivot = 1.0 / a[k * size + k];
-        for i in (0..size).filter(|i| *i != k) {
-            let factor = a[i * size + k] * pivot;
-            if factor == 0.0 {
-                continue;
-            }
-            for matrix in [&mut *a, &mut *inverse] {
-                for c in 0..size {
-                    matrix[i * size + c] -= factor * matrix[k * size + c];
-                }
-            }
-        }
-        for matrix in [&mut *a, &mut *inverse] {
-            matrix[k * size..(k + 1) * size].iter_mut().for_each(|value| *value *= pivot);
-        }
-    }
-    inverse[..size * size].iter().all(|value| value.is_finite())
 }
 
 #[cfg(test)]
@@ -214,19 +182,5 @@ mod tests {
                 assert!((y - expected).abs() < 1e-9, "{theta}: {y} {expected}");
             }
         }
-    }
-
-    #[test]
-    fn an_inverse_is_one_and_a_singular_matrix_has_none() {
-        let a = [0.0, 2.0, 1.0, 1.0, 1e-3, 0.0, 4.0, -1.0, 3.0];
-        let mut inverse = [0.0; 9];
-        assert!(invert(3, &mut a.clone(), &mut inverse));
-        let mut one = [0.0; 9];
-        product(3, &a, &inverse, &mut one);
-        for (k, value) in one.iter().enumerate() {
-            let expected = if k % 4 == 0 { 1.0 } else { 0.0 };
-            assert!((value - expected).abs() < 1e-12, "{one:?}");
-        }
-        assert!(!invert(2, &mut [1.0, 2.0, 2.0, 4.0], &mut [0.0; 4]));
     }
 }
