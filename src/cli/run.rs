@@ -300,7 +300,6 @@ impl Run {
         let ends = ends && self.circuit.harmonics.is_empty();
         if let Some(settings) = self.settings.as_mut().filter(|_| ends) {
             settings.between = false;
-            settings.rows = Interval::Times(vec![settings.stop]);
         }
     }
 

@@ -190,7 +190,7 @@ impl<'a> Rows<'a> {
 
     /// Whether rows are made at every step, to be written or measured.
     pub fn follows_steps(&self) -> bool {
-        self.interval == Interval::Steps || (self.watched > 0 && self.between)
+        self.interval == Interval::Steps || self.watched > 0
     }
 
     /// Whether rows are written at times of their own.
@@ -208,6 +208,9 @@ impl<'a> Rows<'a> {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
+        if !self.between && time < self.stop - self.slack {
+            return Ok(());
+        }
         self.at_end(network, state, time, index2, weights, work)?;
         if time >= self.start - self.slack {
             self.send_step(network)?;

@@ -45,7 +45,7 @@ pub struct Settings {
     pub uic: bool,
     /// When rows are wanted.
     pub rows: Interval,
-    /// Whether those that follow steps are to stand between their ends too, wherever a line would not be straight.
+    /// Whether those that follow steps are to stand wherever a line would not be straight; otherwise the last one alone.
     pub between: bool,
     /// Relative tolerance of one step.
     pub reltol: f64,

@@ -56,6 +56,25 @@ fn measures_are_those_of_the_closed_form() {
 }
 
 #[test]
+fn last_values_are_what_they_are_with_rows_and_without() {
+    let folder = folder();
+    let all = rows(&made(folder.path(), &["sweep", "plan.toml"]));
+    let plan = std::fs::read_to_string(folder.path().join("plan.toml")).unwrap();
+    let plan: Vec<&str> = plan.lines().filter(|line| !line.starts_with("mean")).collect();
+    std::fs::write(folder.path().join("last.toml"), plan.join("\n")).unwrap();
+    // Of the deck's own measures none is left, either.
+    let deck: Vec<&str> = LAG.lines().filter(|line| !line.starts_with(".measure")).collect();
+    std::fs::write(folder.path().join("lag.cir"), deck.join("\n")).unwrap();
+    let table = made(folder.path(), &["sweep", "last.toml"]);
+    assert_eq!(table.lines().next(), Some("run,r,c,end"));
+    let last = rows(&table);
+    assert_eq!(last.len(), all.len());
+    for (last, all) in last.iter().zip(&all) {
+        assert_eq!(last[3], all[4], "{last:?} {all:?}");
+    }
+}
+
+#[test]
 fn threads_parts_and_resumption_change_no_byte() {
     let folder = folder();
     let path = folder.path();
