@@ -80,11 +80,10 @@ pub fn transient(
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
     // Exponentials take what is moved from what they find.
-    let pilot = match exponential::suits(system, settings) {
-        true => None,
-        false => pilot(system, settings)?,
-    };
+    let far = exponential::suits(system, settings);
+    let pilot = if far { None } else { pilot(system, settings)? };
     let mut run = Run::new(system, settings, pilot.as_ref(), Some(sink));
+    run.goes_far = far;
     run.run()?;
     Ok(run.network.statistics)
 }
@@ -263,7 +262,8 @@ struct Run<'a> {
     bound: Bound,
     /// Events since a moment, to see when they pile up.
     crowd: (f64, u32),
-    /// Of a run by exponentials.
+    /// Whether it is to begin with exponentials, and what these have been like.
+    goes_far: bool,
     far: Far,
 }
 
@@ -317,6 +317,7 @@ impl<'a> Run<'a> {
             detour: 0,
             bound: Bound::default(),
             crowd: (0.0, 0),
+            goes_far: false,
             far: Far::default(),
             network,
             settings,

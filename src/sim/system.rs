@@ -206,14 +206,13 @@ impl System {
 
     /// The unknowns that output columns speak of; all of them where a column has a law.
     pub(crate) fn observed(&self) -> Vec<u32> {
-        let mut observed = match self.law_columns.is_empty() {
+        let mut observed: Vec<u32> = match self.law_columns.is_empty() {
             true => self.plain_outputs.iter().map(|(_, unknown)| *unknown).collect(),
             false => (0..self.equations() as u32).collect(),
         };
-        let observed: &mut Vec<u32> = &mut observed;
         observed.sort_unstable();
         observed.dedup();
-        std::mem::take(observed)
+        observed
     }
 
     /// Whether any law is an exponential junction.

@@ -2,7 +2,7 @@
 
 use super::{Run, absolute_tolerances, pilot, take_seen};
 use crate::sim::explain::Failure;
-use crate::sim::methods::{self, Method};
+use crate::sim::methods;
 
 /// The part of what is left of the way that is not worth a step of its own.
 const SLIVER: f64 = 4.0;
@@ -31,8 +31,7 @@ impl Default for Far {
 impl Run<'_> {
     /// The step to try next where the run goes by exponentials.
     pub(super) fn far_step(&self, remaining: f64) -> Option<f64> {
-        let space =
-            self.work.dense.space.as_ref().filter(|_| self.method == Method::Exponential)?;
+        let space = self.work.dense.space.as_ref()?;
         let (farthest, most) = (space.farthest(self.state.t), self.far.most);
         let all = SLIVER * farthest > remaining && most >= remaining;
         Some(if all { remaining } else { farthest.min(most) })

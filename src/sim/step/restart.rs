@@ -77,12 +77,11 @@ impl Run<'_> {
             self.rows_as_stated()?;
         }
         let (method, reason) = methods::choose(&self.network, self.index2);
-        let far = exponential::suits(self.network.system, self.settings);
-        if far && self.index2 {
+        if self.goes_far && self.index2 {
             self.learn_magnitudes()?;
         }
         let (method, reason) = match self.settings.method {
-            _ if far && !self.index2 => {
+            _ if self.goes_far && !self.index2 => {
                 let space = Space::new(self.network.system, self.settings);
                 self.work.dense.space = Some(Box::new(space));
                 (Method::Exponential, exponential::STRAIGHT)
