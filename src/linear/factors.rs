@@ -5,6 +5,7 @@
 //! does not go, the LU of the whole matrix says what is wrong with it.
 
 use super::cholesky::{Cholesky, Orders};
+use super::dense::Dense;
 use super::singletons::{Singletons, Unfit};
 use super::{Lu, Pattern, SMALL, Singular};
 
@@ -24,7 +25,16 @@ pub struct Factors {
 #[derive(Debug)]
 enum Kind {
     Whole(Box<Lu<f64>>),
+    Tiny(Box<Tiny>),
     Parts(Box<Parts>),
+}
+
+/// An order of elimination, and dense factors in it; those of the order's own stand where the dense ones are not good.
+#[derive(Debug)]
+struct Tiny {
+    lu: Lu<f64>,
+    dense: Dense,
+    is_dense: bool,
 }
 
 /// What solves itself, and the rest.
@@ -53,7 +63,16 @@ impl Factors {
         keep_zeros: bool,
         orders: &mut Orders,
     ) -> Result<Factors, Singular> {
-        let whole = |lu| Factors { kind: Kind::Whole(Box::new(lu)), work: vec![0.0; pattern.n] };
+        let whole = |lu| {
+            let kind = match Dense::new(pattern, &lu) {
+                Some(mut dense) => {
+                    let is_dense = dense.load(values);
+                    Kind::Tiny(Box::new(Tiny { lu, dense, is_dense }))
+                }
+                None => Kind::Whole(Box::new(lu)),
+            };
+            Factors { kind, work: vec![0.0; pattern.n] }
+        };
         let small = pattern.n <= SMALL;
         if small {
             let paths = (pattern.n >= LONG)
@@ -98,6 +117,13 @@ impl Factors {
     pub fn refactor(&mut self, values: &[f64]) -> Result<(), Unfit> {
         match &mut self.kind {
             Kind::Whole(lu) => lu.refactor(values).map_err(|_| Unfit::Values),
+            Kind::Tiny(tiny) => {
+                tiny.is_dense = tiny.dense.load(values);
+                if tiny.is_dense {
+                    return Ok(());
+                }
+                tiny.lu.refactor(values).map_err(|_| Unfit::Values)
+            }
             Kind::Parts(parts) => parts.load(values),
         }
     }
@@ -106,10 +132,24 @@ impl Factors {
     pub fn solve(&mut self, b: &mut [f64]) {
         match &mut self.kind {
             Kind::Whole(lu) => lu.solve(b, &mut self.work),
+            Kind::Tiny(tiny) if tiny.is_dense => tiny.dense.solve(b),
+            Kind::Tiny(tiny) => tiny.lu.solve(b, &mut self.work),
             Kind::Parts(parts) => {
                 self.work.copy_from_slice(b);
                 parts.solve(&mut self.work, b);
             }
+        }
+    }
+
+    /// Whether the determinant is negative, where that can be told.
+    pub fn is_negative(&self) -> Option<bool> {
+        match &self.kind {
+            Kind::Whole(lu) => Some(lu.is_negative()),
+            Kind::Tiny(tiny) if tiny.is_dense => {
+                Some(tiny.lu.is_negative_with(tiny.dense.inverse()))
+            }
+            Kind::Tiny(tiny) => Some(tiny.lu.is_negative()),
+            Kind::Parts(_) => None,
         }
     }
 

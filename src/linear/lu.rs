@@ -70,6 +70,8 @@ pub struct Lu<T> {
     /// The least allowed ratio of each pivot to the largest entry below it, and to the largest of its column.
     floors: Vec<(f64, f64)>,
     growth: f64,
+    /// Whether the order is an odd permutation of rows against columns.
+    odd: bool,
 }
 
 impl<T: Field> Lu<T> {
@@ -221,8 +223,24 @@ impl<T: Field> Lu<T> {
     }
 
     /// Rows and columns of the matrix in the order in which they are eliminated.
-    pub fn order(&self) -> (&[u32], &[u32]) {
-        (&self.rows, &self.columns)
+    pub fn order(&self) -> [&[u32]; 2] {
+        [&self.rows, &self.columns]
+    }
+
+    /// Whether the order takes an odd number of swaps of rows and columns.
+    pub fn is_odd(&self) -> bool {
+        self.odd
+    }
+
+    /// Powers of two for rows and columns, in the same order.
+    pub(super) fn scales(&self) -> [&[f64]; 2] {
+        [&self.row_scale, &self.column_scale]
+    }
+
+    /// The least ratio of each pivot to the largest entry below it and to the largest of its column, and the growth of
+    /// entries that is allowed.
+    pub(super) fn guards(&self) -> (&[(f64, f64)], f64) {
+        (&self.floors, GUARD_GROWTH * self.growth)
     }
 
     /// The pivots in the order of elimination, those of the scaled matrix.
@@ -328,6 +346,7 @@ impl<T: Field> Lu<T> {
             operations,
             floors: vec![(0.0, 0.0); n],
             growth: 1.0,
+            odd: is_odd(&elimination.rows) != is_odd(&elimination.columns),
         }
     }
 
@@ -467,6 +486,39 @@ impl<T: Field> Lu<T> {
     }
 }
 
+impl Lu<f64> {
+    /// Whether the determinant is negative.
+    pub fn is_negative(&self) -> bool {
+        self.odd != has_odd_signs(&self.inverse)
+    }
+
+    /// The same for factors in this order whose pivots have these inverses.
+    pub(super) fn is_negative_with(&self, inverse: &[f64]) -> bool {
+        self.odd != has_odd_signs(inverse)
+    }
+}
+
+/// Whether an odd number of values is negative.
+fn has_odd_signs(values: &[f64]) -> bool {
+    values.iter().filter(|value| **value < 0.0).count() % 2 == 1
+}
+
+/// Whether a permutation is made of an odd number of swaps.
+fn is_odd(order: &[u32]) -> bool {
+    let mut seen = vec![false; order.len()];
+    let mut odd = false;
+    for start in 0..order.len() {
+        let (mut at, mut length) = (start, 0);
+        while !seen[at] {
+            seen[at] = true;
+            at = order[at] as usize;
+            length += 1;
+        }
+        odd ^= length > 0 && length % 2 == 0;
+    }
+    odd
+}
+
 /// The way of large matrices, for small ones.
 #[cfg(test)]
 pub(super) fn factor_by_columns<T: Field>(
@@ -513,4 +565,14 @@ fn largest<T: Field>(values: &[T]) -> u64 {
 /// The larger; NaN where there is one.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_of_orders() {
+        assert!(!is_odd(&[0, 1, 2]) && is_odd(&[1, 0, 2]) && !is_odd(&[1, 2, 0]));
+    }
 }

@@ -10,6 +10,7 @@ mod cholesky;
 mod choose;
 mod components;
 mod degree;
+mod dense;
 mod elimination;
 mod factors;
 mod field;

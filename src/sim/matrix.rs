@@ -74,6 +74,11 @@ impl Matrix {
         Ok(())
     }
 
+    /// Whether its determinant is negative, where that can be told.
+    pub fn is_negative(&self) -> Option<bool> {
+        self.factors.as_ref()?.is_negative()
+    }
+
     /// Solves in place.
     pub fn solve(&mut self, statistics: &mut Statistics, vector: &mut [f64]) {
         statistics.solves += 1;
