@@ -1,8 +1,10 @@
 //! Watching a run from outside: Ctrl-C stops it at the next step, a bar shows how far it is.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use signal_hook::consts::SIGINT;
+use signal_hook::flag;
 use std::io::{self, IsTerminal};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -18,13 +20,11 @@ const PARTS: f64 = 1000.0;
 pub fn stop_flag() -> Arc<AtomicBool> {
     let raise = || {
         let flag = Arc::new(AtomicBool::new(false));
-        let raised = flag.clone();
-        // Without a handler Ctrl-C ends the program, which is no worse than before.
-        let _ = ctrlc::set_handler(move || {
-            if raised.swap(true, Ordering::Relaxed) {
-                std::process::exit(super::session::Exit::Interrupted as i32);
-            }
-        });
+        let interrupted = super::session::Exit::Interrupted as i32;
+        // Without handlers Ctrl-C ends the program, which is no worse than before. The first asks for the flag that the
+        // second raises.
+        let _ = flag::register_conditional_shutdown(SIGINT, interrupted, flag.clone());
+        let _ = flag::register(SIGINT, flag.clone());
         flag
     };
     STOP.get_or_init(raise).clone()
