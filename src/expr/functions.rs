@@ -1,11 +1,13 @@
 //! The table of functions: name, number of arguments, value, derivative, spelling in each dialect.
 //!
 //! Derivatives and expansions are small trees over [`Slot`]s, so that the same row serves the graph that
-//! differentiates and the printer that spells. Transcendental functions come from `libm`, never from the platform:
+//! differentiates and the printer that spells. Transcendental functions come from `libm` or are our own, never the platform's:
 //! the same model gives the same digits everywhere.
 
 use super::tree::{Binary, Expr};
-use super::values::{atan2, clamp, max, min, modulo, power_of_abs, real_power, sign, signed_power};
+use super::values::{
+    atan2, clamp, max, min, modulo, power_of_abs, real_power, sign, signed_power, tanh,
+};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 /// A function that expressions may call; its row in [`FUNCTIONS`] says the rest.
@@ -220,7 +222,7 @@ pub const FUNCTIONS: &[Row] = &[
     ),
     row!(Sinh, "sinh", One(libm::sinh), |_| f(Function::Cosh, a()), Name("sinh")),
     row!(Cosh, "cosh", One(libm::cosh), |_| f(Function::Sinh, a()), Name("cosh")),
-    row!(Tanh, "tanh", One(libm::tanh), |_| n(1.0) - y() * y(), Name("tanh")),
+    row!(Tanh, "tanh", One(tanh), |_| n(1.0) - y() * y(), Name("tanh")),
     row!(
         Asinh,
         "asinh",
