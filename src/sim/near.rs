@@ -21,13 +21,18 @@ const TWICE: u32 = 4;
 /// so many stages take that.
 const CHEAPER: u32 = 16;
 
+/// ρ is trusted for twice as many stages each time that it has grown by no more than this, and for so many at most.
+const STEADY: f64 = 2.0;
+const LONGEST_TRUST: u32 = 64;
+
 /// What is known of iterations with the factors at hand.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
     /// ρ; infinite where it is not known.
     rate: f64,
-    /// Stages since it has been measured.
+    /// Stages since it has been measured, and how many may pass until it is measured again.
     age: u32,
+    trusted: u32,
     /// Stages that are still to do without, and how many the next time.
     wait: u32,
     pause: u32,
@@ -36,15 +41,17 @@ pub(crate) struct Near {
 }
 
 impl Near {
-    pub const UNKNOWN: Near = Near { rate: f64::INFINITY, age: 0, wait: 0, pause: 1, twice: 0 };
+    pub const UNKNOWN: Near =
+        Near { rate: f64::INFINITY, age: 0, trusted: MEASURED_AGAIN, wait: 0, pause: 1, twice: 0 };
 
     /// New factors: ρ is not known.
     pub fn forget(&mut self) {
         self.rate = f64::INFINITY;
+        self.trusted = MEASURED_AGAIN;
     }
 
     fn failed(&mut self) {
-        self.rate = f64::INFINITY;
+        self.forget();
         self.wait = self.pause;
         self.pause = (2 * self.pause).min(LONGEST_PAUSE);
     }
@@ -69,7 +76,7 @@ pub(crate) fn solve(
     scratch.guess.copy_from_slice(x);
     let Some(first) = iterate(network, stage, x, q, scratch) else { return false };
     let Scratch { near, residual, .. } = scratch;
-    let known = GROWN * near.rate * first <= stage.unconfirmed && near.age < MEASURED_AGAIN;
+    let known = GROWN * near.rate * first <= stage.unconfirmed && near.age < near.trusted;
     if first == 0.0 || (known && (first <= NEAR || network.meets_no_kink(x))) {
         near.age += 1;
         near.twice = 0;
@@ -87,6 +94,9 @@ pub(crate) fn solve(
         }
         return false;
     }
+    // What has not become larger is trusted for longer.
+    let steady = rate <= STEADY * near.rate;
+    near.trusted = if steady { (2 * near.trusted).min(LONGEST_TRUST) } else { MEASURED_AGAIN };
     (near.rate, near.age, near.pause) = (rate, 0, 1);
     near.twice += 1;
     if near.twice >= TWICE && network.system.has_junctions() {
