@@ -10,6 +10,11 @@ const LEAST: f64 = 0.2;
 /// Errors below this say nothing of how the solution changes.
 const NOTHING: f64 = 1e-2;
 
+/// Rosenbrock methods take this part of the step that an error and how it changes allow; and parts of the power of both.
+const STEADY: f64 = 0.95;
+const INTEGRAL: f64 = 0.3;
+const PROPORTIONAL: f64 = 0.4;
+
 /// The factor by which a step is shortened whose error was too large.
 pub(super) fn after_error(error: f64, power: f64) -> f64 {
     (SAFETY * methods::growth(error, power)).clamp(0.1, 0.9)
@@ -44,10 +49,19 @@ impl Run<'_> {
             return most_allowed;
         }
         let mut factor = SAFETY * methods::growth(size, power);
-        if let Some((last_error, last_h)) = before {
-            // Gustafsson's predictive controller: the error of the last step says how the solution changes.
-            let trend = h / last_h * methods::growth(size / last_error, power);
-            factor = factor.min(factor * trend.max(LEAST)).max(LEAST);
+        match before {
+            // Proportional and integral control (E. Hairer, G. Wanner, Solving ODEs II, 1996, IV.2): of long steps every error
+            // is of something else, and what grows after a small one is refused.
+            Some((last_error, _)) if self.method.is_rosenbrock() => {
+                let by = |error: f64, part: f64| libm::pow(error, part / power);
+                factor = STEADY * by(size, -INTEGRAL - PROPORTIONAL) * by(last_error, PROPORTIONAL);
+            }
+            Some((last_error, last_h)) => {
+                // Gustafsson's predictive controller: the error of the last step says how the solution changes.
+                let trend = h / last_h * methods::growth(size / last_error, power);
+                factor = factor.min(factor * trend.max(LEAST)).max(LEAST);
+            }
+            None => {}
         }
         let keeps = KEPT.contains(&factor) && self.network.favours_equal_steps();
         if keeps && !failed { 1.0 } else { factor.clamp(LEAST, most_allowed) }
