@@ -571,8 +571,49 @@ impl<'a> Network<'a> {
         let at = |theta: f64| move |k: usize| dense.unknown(k, theta, from, to);
         self.system.has_junctions_alone()
             && self.system.groups.iter().filter_map(|group| group.junction).all(|junction| {
-                rests(&junction, &[0.0, 0.5, 1.0].map(|theta| voltage_across(&junction, at(theta))))
+                let across = |theta: f64| voltage_across(&junction, at(theta));
+                rests(&junction, &[0.0, 0.5, 1.0].map(across))
             })
+    }
+
+    /// Whether currents of junctions move none of these unknowns while linear storages keep what they hold: what bends with a
+    /// diode are their rates then. Pivots are forgotten on the way.
+    pub fn bends_only_rates_of(&mut self, unknowns: &[u32]) -> bool {
+        /// What is less than this part of what moves most is rounding.
+        const ROUNDING: f64 = 1e-9;
+        let system = self.system;
+        let linear: Vec<bool> =
+            system.held.iter().zip(&system.curved).map(|(held, curved)| *held && !curved).collect();
+        let n = system.equations();
+        let mut moved = vec![0.0; n + system.charges()];
+        self.forget_pivots();
+        let regular = self.factorise_frozen(&linear).is_ok();
+        let junctions = system.groups.iter().filter(|group| group.junction.is_some());
+        let mut targets = junctions.flat_map(|group| &group.targets);
+        let unmoved = regular
+            && targets.all(|target| {
+                let Target::Equations(into) = target else { return true };
+                moved.fill(0.0);
+                into.iter().for_each(|(row, factor)| moved[*row as usize] += factor);
+                self.solve_frozen(&mut moved);
+                let most = moved[..n].iter().fold(0.0f64, |most, moved| most.max(moved.abs()));
+                unknowns.iter().all(|k| moved[*k as usize].abs() <= ROUNDING * most)
+            });
+        self.forget_pivots();
+        unmoved
+    }
+
+    /// Whether something grows at more than the rate α of the factors at hand, where that can be told: W(α) has a determinant
+    /// of another sign than where nothing can grow so fast. That is, with all charges held, the sign of the frozen
+    /// matrix's, and of each −1 for each charge: det(G + α·A·Q') = αᵏ·det(G, A; −Q', 1/α).
+    pub fn outgrows_step(&mut self) -> Option<bool> {
+        let system = self.system;
+        if system.held.iter().any(|held| !held) {
+            return None;
+        }
+        self.factorise_frozen(&system.held).ok()?;
+        let odd = system.charges() % 2 == 1;
+        Some((self.stages.matrix.is_negative()? != self.frozen.is_negative()?) != odd)
     }
 
     /// Solves W·y = y in place.

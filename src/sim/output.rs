@@ -67,6 +67,8 @@ pub(crate) struct Rows<'a> {
     reltol: f64,
     /// So many columns, the last ones, are measured.
     watched: usize,
+    /// Whether no column bends with a junction, but at most its rate.
+    only_rates_bend: bool,
     /// Differences that mean nothing in any column.
     least: f64,
     /// The next row of a grid or list.
@@ -98,6 +100,7 @@ impl<'a> Rows<'a> {
             longest: settings.hmax.unwrap_or(f64::INFINITY),
             reltol: settings.reltol,
             watched: system.watched,
+            only_rates_bend: false,
             least: 1e-2 * settings.abstol,
             next: 0,
             row: vec![0.0; columns + 1],
@@ -109,6 +112,16 @@ impl<'a> Rows<'a> {
             high: vec![f64::NEG_INFINITY; columns],
             inside: Inside::of_outputs(network),
         }
+    }
+
+    /// Looks, once at the start of a run, at how columns follow from what storages hold.
+    pub fn look_at(&mut self, network: &mut Network) {
+        let system = network.system;
+        let straight = system.law_columns.is_empty() && !system.output_rates;
+        self.only_rates_bend = self.follows_within()
+            && straight
+            && system.has_junctions_alone()
+            && network.bends_only_rates_of(&system.observed());
     }
 
     /// The time of the next row of a grid or list; infinite when there are no more.
@@ -135,6 +148,11 @@ impl<'a> Rows<'a> {
             }
             self.next += 1;
         }
+    }
+
+    /// Whether a row of a grid or list is due before a time.
+    pub fn are_due(&mut self, time: f64) -> bool {
+        self.next_time() < time
     }
 
     /// Writes the rows that are due at `state` (its time, after a corner or event has been passed).
@@ -241,15 +259,16 @@ impl<'a> Rows<'a> {
             self.left.copy_from_slice(&self.row);
             return Ok(());
         }
-        // Whether columns are straight is read off parabolas through the past, where steps are short enough for them;
-        // only what is written is solved for. Within the long steps of methods of higher order what follows a source
-        // moves in ways that their polynomials do not say, unless that is straight and all is linear; nor does the past say
-        // that a diode begins to conduct.
-        let by_past = work.dense.by_past
+        // Whether columns are straight is read off parabolas, through a stage or through the past, where steps are short
+        // enough for them; only what is written is solved for. Within the long steps of methods of higher order what
+        // follows a source moves in ways that their polynomials do not say, unless that is straight and all is linear; nor
+        // do parabolas say that a diode begins to conduct.
+        // A stage is nearer than the past, but for currents that bend with a junction.
+        let followed = (work.dense.by_past || (work.dense.by_unknowns && self.only_rates_bend))
             && !network.system.output_rates
             && (!network.system.has_junctions() || network.rests_within(&work.dense, from, to));
-        let smooth = !index2 && (by_past || network.is_straight());
-        let parabolic = by_past && network.system.law_columns.is_empty();
+        let smooth = !index2 && (followed || network.is_straight());
+        let parabolic = followed && network.system.law_columns.is_empty();
         let far = work.dense.space.is_some();
         let most_halved = if far { FAR_HALVED } else { MOST_HALVED };
         // Pieces are halved from the left; what is still to come lies on a pile.

@@ -4,6 +4,7 @@ mod bound;
 mod crossing;
 mod far;
 mod first;
+mod layer;
 pub(super) mod past;
 mod restart;
 mod rounding;
@@ -15,6 +16,7 @@ use self::bound::Bound;
 use self::crossing::{Crossed, Located, Search};
 use self::far::Far;
 use self::first::First;
+use self::layer::Layer;
 use self::rounding::Rounding;
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
@@ -251,8 +253,9 @@ struct Run<'a> {
     /// Whether no step has been accepted since the last restart, and whether its fast layer has been passed over.
     fresh: bool,
     smoothed: bool,
-    /// What did after corners and events.
+    /// What did after corners and events, and the layers there.
     first: First,
+    layer: Layer,
     /// The end of the last step that failed.
     wall: f64,
     /// The method to come back to, and after how many steps; 0 where there is nothing to come back from.
@@ -312,6 +315,7 @@ impl<'a> Run<'a> {
             fresh: true,
             smoothed: false,
             first: First::new(),
+            layer: Layer::new(system),
             wall: 0.0,
             home: settings.method,
             detour: 0,

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-fn prepared(text: &str) -> Run {
+pub(super) fn prepared(text: &str) -> Run {
     let mut map = SourceMap::default();
     let file = map.add("circuit.cir", text);
     let mut d = vec![];
@@ -17,7 +17,7 @@ fn prepared(text: &str) -> Run {
 }
 
 /// A run with other settings.
-fn run_with(run: &Run, change: impl FnOnce(&mut Settings)) -> (Trace, Statistics) {
+pub(super) fn run_with(run: &Run, change: impl FnOnce(&mut Settings)) -> (Trace, Statistics) {
     let mut settings = run.settings.clone().expect("a run over time");
     change(&mut settings);
     let mut d = vec![];
@@ -29,7 +29,7 @@ fn run_with(run: &Run, change: impl FnOnce(&mut Settings)) -> (Trace, Statistics
 }
 
 /// The largest difference of each column, as a part of its range in the second.
-fn differences(a: &Trace, b: &Trace) -> Vec<f64> {
+pub(super) fn differences(a: &Trace, b: &Trace) -> Vec<f64> {
     assert_eq!(a.rows(), b.rows());
     let columns = a.columns.iter().zip(&b.columns).skip(1);
     let off = |(a, b): (&Vec<f64>, &Vec<f64>)| {

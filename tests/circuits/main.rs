@@ -8,6 +8,7 @@ mod analyses;
 mod fourier;
 mod poles;
 mod sensitivity;
+mod layers;
 mod measures;
 mod condensed;
 mod meshes;

@@ -35,10 +35,20 @@ impl Kind {
     }
 }
 
-/// Kinds of corners and events, each with the step that did after it where longer ones had failed.
+/// What is known of corners or events of a kind.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    kind: Kind,
+    /// The step that did after it, where longer ones had failed.
+    did: Option<f64>,
+    /// How often the layer after it could not be passed over.
+    stayed: u32,
+}
+
+/// What is known of kinds of corners and events.
 #[derive(Debug, Default)]
 pub(super) struct First {
-    known: Vec<(Kind, Option<f64>)>,
+    known: Vec<Known>,
     /// The next to be forgotten.
     oldest: usize,
     /// That of the last corner or event.
@@ -70,18 +80,24 @@ impl First {
         self.present = Some(self.place(Kind::Event(mode, value)));
     }
 
+    /// How often the layer after the last corner or event could not be passed over, where that is of a known kind.
+    pub fn stayed(&mut self) -> Option<&mut u32> {
+        self.present.map(|place| &mut self.known[place].stayed)
+    }
+
     /// The place of a kind, a new one where it is not known.
     fn place(&mut self, kind: Kind) -> usize {
-        if let Some(place) = self.known.iter().position(|(known, _)| known.is_like(kind)) {
+        if let Some(place) = self.known.iter().position(|known| known.kind.is_like(kind)) {
             return place;
         }
+        let new = Known { kind, did: None, stayed: 0 };
         if self.known.len() < KINDS {
-            self.known.push((kind, None));
+            self.known.push(new);
             return self.known.len() - 1;
         }
         let place = self.oldest;
         self.oldest = (place + 1) % KINDS;
-        self.known[place] = (kind, None);
+        self.known[place] = new;
         place
     }
 }
@@ -90,12 +106,18 @@ impl Run<'_> {
     /// A careful first step after a corner or event, and no longer than what did after the last one of its kind, where longer
     /// ones had failed.
     pub(super) fn shorten(&mut self) {
-        let span = self.distance();
-        let careful = (0.1 * span).min(self.until_charges_change());
-        let known = self.first.present.and_then(|place| self.first.known[place].1);
+        let known = self.first.present.and_then(|place| self.first.known[place].did);
         self.begin_far(known);
-        let most = known.map_or(careful, |did| did.min(careful));
-        self.h = (0.5 * self.h).min(most).max(self.smallest);
+        let usual = 0.5 * self.h;
+        let careful = |run: &mut Self| {
+            let most = (0.1 * run.distance()).min(run.until_charges_change());
+            usual.min(most).max(run.smallest)
+        };
+        self.h = careful(self);
+        if self.passes_layer() {
+            self.h = careful(self);
+        }
+        self.h = self.h.min(known.unwrap_or(f64::INFINITY)).max(self.smallest);
     }
 
     /// Where there are junctions, the time in which rates change a charge by a small part of the largest it has been at a
@@ -119,7 +141,7 @@ impl Run<'_> {
     /// The first step after a corner or event says how long the next one of its kind may be.
     pub(super) fn learn_first(&mut self, h: f64, failed: bool) {
         if let Some(place) = self.first.present.take() {
-            self.first.known[place].1 = failed.then_some(h);
+            self.first.known[place].did = failed.then_some(h);
         }
     }
 }

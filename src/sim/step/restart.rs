@@ -95,6 +95,9 @@ impl Run<'_> {
         self.home = method;
         count_system(&mut self.network, method.name(), reason);
         self.expect_limit();
+        if let Some(rows) = self.rows.as_mut().filter(|_| !self.index2) {
+            rows.look_at(&mut self.network);
+        }
         let span = self.distance();
         self.h = self.settings.h0.unwrap_or(1e-3 * span).min(span);
         self.rows_first()?;
@@ -282,7 +285,7 @@ impl Run<'_> {
         }
     }
 
-    fn euler(&mut self, h: f64) -> Result<(), Cut> {
+    pub(super) fn euler(&mut self, h: f64) -> Result<(), Cut> {
         let Run { network, state, next, work, weights, .. } = self;
         let alpha = 1.0 / h;
         for (beta, q) in work.beta.iter_mut().zip(&state.q) {
