@@ -13,6 +13,7 @@ use super::statistics::Statistics;
 use super::system::{LawGroup, System, Target};
 use crate::circuit::waveform::Segment;
 use crate::linear::{Orders, Singular};
+use crate::quantity::random;
 
 /// The conductance that pins a node to its `.ic` value, as in SPICE.
 const PIN: f64 = 1e10;
@@ -582,25 +583,26 @@ impl<'a> Network<'a> {
         /// What is less than this part of what moves most is rounding.
         const ROUNDING: f64 = 1e-9;
         let system = self.system;
-        let linear: Vec<bool> =
-            system.held.iter().zip(&system.curved).map(|(held, curved)| *held && !curved).collect();
+        let charges = system.held.iter().zip(&system.curved);
+        let linear: Vec<bool> = charges.map(|(held, curved)| *held && !curved).collect();
         let n = system.equations();
+        // All of them at once, each with a part of its own, so that none takes back what another does.
         let mut moved = vec![0.0; n + system.charges()];
+        let junctions = system.groups.iter().filter(|group| group.junction.is_some());
+        for (k, target) in junctions.flat_map(|group| &group.targets).enumerate() {
+            if let Target::Equations(into) = target {
+                let part = 0.5 + random::fraction(0, k as u64);
+                into.iter().for_each(|(row, factor)| moved[*row as usize] += part * factor);
+            }
+        }
         self.forget_pivots();
         let regular = self.factorise_frozen(&linear).is_ok();
-        let junctions = system.groups.iter().filter(|group| group.junction.is_some());
-        let mut targets = junctions.flat_map(|group| &group.targets);
-        let unmoved = regular
-            && targets.all(|target| {
-                let Target::Equations(into) = target else { return true };
-                moved.fill(0.0);
-                into.iter().for_each(|(row, factor)| moved[*row as usize] += factor);
-                self.solve_frozen(&mut moved);
-                let most = moved[..n].iter().fold(0.0f64, |most, moved| most.max(moved.abs()));
-                unknowns.iter().all(|k| moved[*k as usize].abs() <= ROUNDING * most)
-            });
+        if regular {
+            self.solve_frozen(&mut moved);
+        }
         self.forget_pivots();
-        unmoved
+        let most = moved[..n].iter().fold(0.0f64, |most, moved| most.max(moved.abs()));
+        regular && unknowns.iter().all(|k| moved[*k as usize].abs() <= ROUNDING * most)
     }
 
     /// Whether something grows at more than the rate α of the factors at hand, where that can be told: W(α) has a determinant

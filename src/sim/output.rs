@@ -120,6 +120,7 @@ impl<'a> Rows<'a> {
         let straight = system.law_columns.is_empty() && !system.output_rates;
         self.only_rates_bend = self.follows_within()
             && straight
+            && system.has_junctions()
             && system.has_junctions_alone()
             && network.bends_only_rates_of(&system.observed());
     }

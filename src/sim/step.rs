@@ -346,6 +346,7 @@ impl<'a> Run<'a> {
                 self.pass_corner()?;
             }
             self.rows_at_state()?;
+            self.pass_layer();
         }
         Ok(())
     }

@@ -53,6 +53,8 @@ pub(super) struct First {
     oldest: usize,
     /// That of the last corner or event.
     present: Option<usize>,
+    /// Half of the last step before it.
+    usual: f64,
 }
 
 impl First {
@@ -80,6 +82,11 @@ impl First {
         self.present = Some(self.place(Kind::Event(mode, value)));
     }
 
+    /// The step that did after the last corner or event of the present kind, where longer ones had failed.
+    fn did(&self) -> Option<f64> {
+        self.present.and_then(|place| self.known[place].did)
+    }
+
     /// How often the layer after the last corner or event could not be passed over, where that is of a known kind.
     pub fn stayed(&mut self) -> Option<&mut u32> {
         self.present.map(|place| &mut self.known[place].stayed)
@@ -103,21 +110,19 @@ impl First {
 }
 
 impl Run<'_> {
-    /// A careful first step after a corner or event, and no longer than what did after the last one of its kind, where longer
-    /// ones had failed.
+    /// Shortens the step after a corner or event.
     pub(super) fn shorten(&mut self) {
-        let known = self.first.present.and_then(|place| self.first.known[place].did);
-        self.begin_far(known);
-        let usual = 0.5 * self.h;
-        let careful = |run: &mut Self| {
-            let most = (0.1 * run.distance()).min(run.until_charges_change());
-            usual.min(most).max(run.smallest)
-        };
-        self.h = careful(self);
-        if self.passes_layer() {
-            self.h = careful(self);
-        }
-        self.h = self.h.min(known.unwrap_or(f64::INFINITY)).max(self.smallest);
+        self.begin_far(self.first.did());
+        self.first.usual = 0.5 * self.h;
+        self.be_careful();
+    }
+
+    /// Makes the next step a careful first one, and no longer than what did after the last corner or event of its kind, where
+    /// longer ones had failed.
+    pub(super) fn be_careful(&mut self) {
+        let careful = (0.1 * self.distance()).min(self.until_charges_change());
+        let most = self.first.did().map_or(careful, |did| did.min(careful));
+        self.h = self.first.usual.min(most).max(self.smallest);
     }
 
     /// Where there are junctions, the time in which rates change a charge by a small part of the largest it has been at a

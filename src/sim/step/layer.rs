@@ -41,9 +41,11 @@ impl Layer {
 
 impl Run<'_> {
     /// Passes over the layer after a corner or event, where there is one that need not be resolved: it is thinner than what a
-    /// careful first step would be, and no other unknown than those of output columns decides when something happens. Says
-    /// whether it has.
-    pub(super) fn passes_layer(&mut self) -> bool {
+    /// careful first step would be, and nothing that follows from the solution decides when something happens.
+    pub(super) fn pass_layer(&mut self) {
+        if !self.fresh {
+            return;
+        }
         let span = SPAN * self.distance();
         let Run { network, rows, index2, method, layer, first, settings, .. } = self;
         let system = network.system;
@@ -60,20 +62,20 @@ impl Run<'_> {
             && rows.as_mut().is_some_and(|rows| !rows.are_due(self.state.t + span))
             && first.stayed().is_some_and(|stayed| *stayed < TRIES);
         if !may {
-            return false;
+            return;
         }
         self.layer.start.copy_from(&self.state);
         let passed = self.die_out(span);
         if passed {
             self.network.statistics.accepted += 1;
             self.weigh();
+            self.be_careful();
         } else {
             self.state.copy_from(&self.layer.start);
         }
         if let Some(stayed) = self.first.stayed() {
             *stayed = if passed { 0 } else { *stayed + 1 };
         }
-        passed
     }
 
     /// Steps over a layer; says whether they stand.
