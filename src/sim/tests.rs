@@ -760,3 +760,26 @@ fn an_infinite_slope_by_time_is_no_obstacle() {
     assert_eq!(statistics.method, "trbdf2");
     assert!(worst(&trace, "v(1)", f64::sqrt) < 1e-9, "{statistics}");
 }
+
+#[test]
+fn what_grows_faster_than_a_step_shows_in_the_sign_of_a_determinant() {
+    use super::network::Network;
+    // A node that grows at 1000/s beside what decays: one, two and three storages.
+    let grows = || vec![("R1", vec![1, 0], r(-1e3)), ("C1", vec![1, 0], c(1e-6, 0.0))];
+    let decays = || vec![("R2", vec![2, 0], r(10.0)), ("C2", vec![2, 0], c(1e-6, 0.0))];
+    let coil = || vec![("R3", vec![3, 0], r(5.0)), ("L3", vec![3, 0], l(1e-3, 0.0))];
+    let cases: [Vec<Part>; 3] = [
+        grows(),
+        grows().into_iter().chain(decays()).collect(),
+        grows().into_iter().chain(decays()).chain(coil()).collect(),
+    ];
+    for parts in cases {
+        let system = system(parts);
+        for (alpha, expected) in [(100.0, true), (999.0, true), (1001.0, false), (1e7, false)] {
+            let mut network = Network::new(&system, 0.0, 1.0);
+            network.linearise(&vec![0.0; system.equations()], 0.0, false);
+            network.factorise_dynamic(alpha).unwrap();
+            assert_eq!(network.outgrows_step(), Some(expected), "{} {alpha}", system.charges());
+        }
+    }
+}
