@@ -84,7 +84,7 @@ pub struct DeviceLabel {
 }
 
 /// A charge or flux Q = linear·x + law(x), whose rate enters equations.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Charge {
     /// The device that stores it.
     pub device: DeviceId,
@@ -101,7 +101,7 @@ pub struct Charge {
 }
 
 /// A term of f: `law` enters each equation of `into` with its factor.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LawStamp {
     /// The device.
     pub device: DeviceId,
@@ -127,7 +127,7 @@ pub struct Junction {
 }
 
 /// A term of b: an independent source enters the *right-hand side* of each equation of `into` with its factor.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SourceStamp {
     /// The device.
     pub device: DeviceId,
@@ -139,8 +139,18 @@ pub struct SourceStamp {
     pub into: Terms,
 }
 
+impl SourceStamp {
+    fn differs_in_course_alone(&self, other: &SourceStamp) -> bool {
+        let (own, others) = (&self.waveform, &other.waveform);
+        let moves = std::mem::discriminant(own) == std::mem::discriminant(others)
+            && !own.is_constant()
+            && !others.is_constant();
+        self.device == other.device && self.into == other.into && (moves || own == others)
+    }
+}
+
 /// A two-state mode with hysteresis: becomes 1 when `control` rises through `on`, 0 when it falls through `off`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
     /// The device.
     pub device: DeviceId,
@@ -157,7 +167,7 @@ pub struct Mode {
 }
 
 /// A sum of multiples of waveforms that consist of straight lines.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Course {
     /// What does not change.
     pub constant: f64,
@@ -194,7 +204,7 @@ pub struct Line {
 }
 
 /// A term of b that follows from the past of `input`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MemoryStamp {
     /// The device.
     pub device: DeviceId,
@@ -257,6 +267,38 @@ pub struct Stamps {
 }
 
 impl Stamps {
+    /// Whether these are those of another circuit but for the courses of sources, and for those only where they move here
+    /// and there: what stands still may be counted upon.
+    pub fn differ_in_courses_alone(&self, other: &Stamps) -> bool {
+        let Stamps {
+            spoken: _,
+            unknowns,
+            nodes,
+            conductances,
+            charges,
+            laws,
+            sources,
+            memories,
+            modes,
+            outputs,
+            watched,
+            initial,
+            guesses,
+            starts,
+            initial_holds,
+            devices,
+        } = self;
+        let mut pairs = sources.iter().zip(&other.sources);
+        (nodes, watched, initial_holds) == (&other.nodes, &other.watched, &other.initial_holds)
+            && sources.len() == other.sources.len()
+            && pairs.all(|(own, other)| own.differs_in_course_alone(other))
+            && conductances == &other.conductances
+            && (initial, guesses, starts) == (&other.initial, &other.guesses, &other.starts)
+            && (charges, memories, modes) == (&other.charges, &other.memories, &other.modes)
+            && (unknowns, laws, outputs) == (&other.unknowns, &other.laws, &other.outputs)
+            && devices == &other.devices
+    }
+
     /// Gives back what a system has been compiled from: names of columns stay.
     pub fn give_back(&mut self) {
         self.unknowns = vec![];

@@ -269,6 +269,7 @@ pub fn circuit(
 }
 
 /// A netlist with what the command line says of it: a circuit for any values of its sweeps.
+#[derive(Clone)]
 pub struct Deck {
     /// The netlist.
     pub netlist: Netlist,
@@ -299,6 +300,13 @@ pub fn deck(
 }
 
 impl Deck {
+    /// The same with other values of parameters.
+    pub fn set(&self, set: &[(String, String)], d: &mut Vec<Diagnostic>) -> Deck {
+        let mut deck = self.clone();
+        super::deck::set_parameters(&mut deck.netlist, set, d);
+        deck
+    }
+
     /// The flat circuit with some names set to other values, for an analysis other than the last where one is named.
     /// `step` is that of `.step`, from 0 on.
     pub fn circuit(

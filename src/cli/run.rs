@@ -9,7 +9,9 @@ use crate::circuit::{Analysis, Axis, Circuit, Gradients, Sensitivity, sweep};
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::quantity::nearest;
 use crate::sim::analyses::{self, ANALYSES, Job};
-use crate::sim::{self, Failure, FailureKind, Interval, Progress, Settings, Statistics, System};
+use crate::sim::{
+    self, Failure, FailureKind, Interval, Progress, Seat, Settings, Statistics, System,
+};
 use crate::source::{FileId, SourceMap, Span};
 use crate::trace::measure::Measure;
 use crate::trace::{Sink, Trace};
@@ -53,16 +55,17 @@ pub fn prepare(
     pick: Option<&str>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Run> {
-    prepare_with(map, file, overrides, pick, &mut |_, _| {}, d)
+    prepare_with(map, file, overrides, pick, &mut |_, _| {}, None, d)
 }
 
-/// The same, with a circuit that is completed before anything follows from it.
+/// The same, with a circuit that is completed before anything follows from it; and with a run that it may be like.
 pub fn prepare_with(
     map: &mut SourceMap,
     file: FileId,
     overrides: &Overrides,
     pick: Option<&str>,
-    complete: &mut dyn FnMut(&mut Circuit, &mut Vec<Diagnostic>),
+    complete: Complete,
+    like: Option<&Run>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Run> {
     if let Some(name) = pick
@@ -78,9 +81,23 @@ pub fn prepare_with(
             d.push(endless());
             return None;
         }
-        return ready(circuit, &units, true, pick, d);
+        return ready_like(circuit, &units, true, pick, like, d);
     }
     let deck = pipeline::deck(map, file, overrides, d)?;
+    prepare_deck(deck, pick, complete, like, d)
+}
+
+/// Completes a circuit.
+pub type Complete<'a> = &'a mut dyn FnMut(&mut Circuit, &mut Vec<Diagnostic>);
+
+/// The same of a netlist that has been read.
+pub fn prepare_deck(
+    deck: Deck,
+    pick: Option<&str>,
+    complete: Complete,
+    like: Option<&Run>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
     let mut circuit = deck.circuit(0, &[], pick, d)?;
     if !circuit.steps.is_empty() {
         let steps = std::mem::take(&mut circuit.steps);
@@ -96,7 +113,7 @@ pub fn prepare_with(
     let varies = !circuit.steps.is_empty() || !is_over_time(pick, &circuit);
     let units = deck.units.clone();
     let deck = varies.then_some(deck);
-    let mut run = ready(circuit, &units, false, pick, d)?;
+    let mut run = ready_like(circuit, &units, false, pick, like, d)?;
     run.deck = deck;
     Some(run)
 }
@@ -132,10 +149,22 @@ fn unknown(name: &str) -> Diagnostic {
 
 /// Makes a circuit ready to run. `native`: it comes from a bond graph.
 pub fn ready(
+    circuit: Circuit,
+    units: &Units,
+    native: bool,
+    pick: Option<&str>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<Run> {
+    ready_like(circuit, units, native, pick, None, d)
+}
+
+/// The same; what was compiled for a run like it is not compiled again.
+fn ready_like(
     mut circuit: Circuit,
     units: &Units,
     native: bool,
     pick: Option<&str>,
+    like: Option<&Run>,
     d: &mut Vec<Diagnostic>,
 ) -> Option<Run> {
     let stamps = stamps::stamp(&circuit, d)?;
@@ -184,7 +213,13 @@ pub fn ready(
         // All that follows is made of the stamps: of a large circuit the devices take as much memory as the run.
         circuit.devices = vec![];
     }
-    let system = compiled(&analysis, &stamps, d)?;
+    let over_time = matches!(analysis, Analysis::Transient { .. });
+    let like = like.filter(|like| over_time && like.is_one_over_time());
+    let known = like.and_then(|like| sim::compile_like(&stamps, &like.stamps, &like.system));
+    let system = match known {
+        Some(system) => system,
+        None => compiled(&analysis, &stamps, d)?,
+    };
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
     let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
@@ -288,8 +323,7 @@ impl Run {
     /// Gives back what the circuit was made of, unless it may have to be made again: with other values, or with all of its
     /// unknowns.
     pub fn give_back(&mut self) {
-        let over_time = matches!(self.analysis, Analysis::Transient { .. });
-        if over_time && self.deck.is_none() && self.steps.is_empty() && !self.system.condensed {
+        if self.is_one_over_time() && self.deck.is_none() && !self.system.condensed {
             self.stamps.give_back();
         }
     }
@@ -313,14 +347,39 @@ impl Run {
 
     /// Runs, and sends rows to a sink; also tells what was measured.
     pub fn go_measured(&self, sink: &mut dyn Sink) -> (Result<Statistics, Failure>, Taking) {
+        let mut measuring = self.measuring(sink);
+        let result = self.analyse(&mut measuring);
+        let (measured, harmonics) = measuring.finish();
+        (result, Taking { measured, harmonics })
+    }
+
+    /// The same beside other runs, where it is one over time.
+    pub async fn go_beside(
+        &self,
+        sink: &mut dyn Sink,
+        seat: Seat<'_>,
+    ) -> (Result<Statistics, Failure>, Taking) {
+        let Some(settings) = self.settings.as_ref().filter(|_| self.is_one_over_time()) else {
+            return self.go_measured(sink);
+        };
+        let mut measuring = self.measuring(sink);
+        let Run { stamps, system, .. } = self;
+        let run = sim::run_in_company(stamps, system, settings, &mut measuring, Some(seat));
+        let result = run.await;
+        let (measured, harmonics) = measuring.finish();
+        (result, Taking { measured, harmonics })
+    }
+
+    fn measuring<'s>(&'s self, sink: &'s mut dyn Sink) -> Measuring<'s> {
         let times = self.settings.as_ref().is_some_and(|s| s.rows != Interval::Steps);
         let own = self.analysis.name();
         let over_time = self.settings.as_ref().filter(|_| own == "tran");
         let taken = taken(&self.circuit, over_time);
-        let mut measuring = Measuring::new(sink, taken, own, &self.all, times);
-        let result = self.analyse(&mut measuring);
-        let (measured, harmonics) = measuring.finish();
-        (result, Taking { measured, harmonics })
+        Measuring::new(sink, taken, own, &self.all, times)
+    }
+
+    fn is_one_over_time(&self) -> bool {
+        matches!(self.analysis, Analysis::Transient { .. }) && self.steps.is_empty()
     }
 
     fn analyse(&self, sink: &mut Measuring) -> Result<Statistics, Failure> {

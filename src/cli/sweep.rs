@@ -17,6 +17,7 @@ use crate::analysis::sweep::{Axis, Reading, Space};
 use crate::bond::elaborate::Overrides;
 use crate::diagnostic::{Diagnostic, has_errors};
 use crate::quantity::Unit;
+use crate::sim::Group;
 use crate::source::{FileId, Span};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -108,7 +109,7 @@ fn sweep(arguments: &Arguments, session: &mut Session) -> Result<Exit, Exit> {
         (name, _) => name.clone(),
     };
     let part = Part { shard: shard.unwrap_or(Shard::WHOLE), total: sweep.space.runs() };
-    let runner = Runner::new(&sweep, arguments.traces.as_deref(), session)?;
+    let mut runner = Runner::new(&sweep, arguments.traces.as_deref(), session)?;
     let mut d = vec![];
     // Whatever is wrong with all runs is said once, by the first of them.
     let first = part.run(0).unwrap_or(0);
@@ -152,6 +153,8 @@ fn go(
     let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = arguments.threads.map_or_else(processors, |threads| threads as usize);
     let threads = threads.min((part.runs() - done) as usize).max(1);
+    // No thread has more of the runs than its part.
+    let abreast = (part.runs() - done).div_ceil(threads as u64) as usize;
     let stop = watch::stop_flag();
     let bar = Bar::new(session.global.quiet);
     let next = AtomicU64::new(done);
@@ -162,13 +165,15 @@ fn go(
         for _ in 0..threads {
             let (sender, next, map, stop) = (sender.clone(), &next, &map, &stop);
             let work = move || {
-                while !stop.load(Ordering::Relaxed) {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(run) = part.run(at) else { return };
-                    if sender.send((at, runner.run(run, map, stop))).is_err() {
-                        return;
-                    }
-                }
+                let begin = |seat| {
+                    let at = match stop.load(Ordering::Relaxed) {
+                        true => return None,
+                        false => next.fetch_add(1, Ordering::Relaxed),
+                    };
+                    let run = part.run(at)?;
+                    Some(async move { (at, runner.run(run, map, stop, seat).await) })
+                };
+                Group::default().run(abreast, begin, |outcome| sender.send(outcome).is_ok());
             };
             // As deep as the main thread: trees are walked by recursion.
             let builder = std::thread::Builder::new().stack_size(super::STACK);

@@ -11,6 +11,7 @@ use super::dag::{Dag, NodeId, Op};
 use super::functions::{Function, Value};
 use super::tree::{Binary, Table, Unary};
 use super::values::{max, min, power, sign};
+use crate::linear::{Number, Pack, put_lane};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -33,6 +34,25 @@ enum Code {
     Many(Vec<Batch>, Vec<[u32; 4]>),
     /// Each with its own operation, where hardly any two of one kind stand together.
     Single(Vec<(Operation, [u16; 4])>),
+}
+
+impl Code {
+    fn is_like(&self, other: &Code) -> bool {
+        let batches = |a: &[Batch], b: &[Batch]| {
+            let mut pairs = a.iter().zip(b);
+            a.len() == b.len()
+                && pairs.all(|(a, b)| a.count == b.count && a.operation.is_like(b.operation))
+        };
+        match (self, other) {
+            (Code::Few(a, code), Code::Few(b, other)) => batches(a, b) && code == other,
+            (Code::Many(a, code), Code::Many(b, other)) => batches(a, b) && code == other,
+            (Code::Single(a), Code::Single(b)) => {
+                let mut pairs = a.iter().zip(b);
+                a.len() == b.len() && pairs.all(|(a, b)| a.1 == b.1 && a.0.is_like(b.0))
+            }
+            _ => false,
+        }
+    }
 }
 
 /// Batches of fewer instructions on average cost more than they save.
@@ -83,6 +103,24 @@ enum Operation {
         batches: u32,
         instructions: u32,
     },
+}
+
+impl Operation {
+    /// Whether it does the same; functions that may be the same count as different ones.
+    fn is_like(self, other: Operation) -> bool {
+        use Operation::*;
+        match (self, other) {
+            (One(a), One(b)) => std::ptr::fn_addr_eq(a, b),
+            (Two(a), Two(b)) => std::ptr::fn_addr_eq(a, b),
+            (Truth(a), Truth(b)) => a == b,
+            (Table(a), Table(b)) | (Slope(a), Slope(b)) => a == b,
+            (
+                Unless { register, holds, batches, instructions },
+                Unless { register: r, holds: h, batches: b, instructions: i },
+            ) => (register, holds, batches, instructions) == (r, h, b, i),
+            _ => std::mem::discriminant(&self) == std::mem::discriminant(&other),
+        }
+    }
 }
 
 /// Instructions are put together within so many: what is computed stays near where it is used.
@@ -280,12 +318,27 @@ impl Program {
     }
 
     /// Registers for [`run`](Program::run), with the constants in place.
-    pub fn registers(&self) -> Vec<f64> {
+    pub fn registers<T: Number>(&self) -> Vec<T> {
         let used = self.first_result() + self.instructions();
         let size = FILES.into_iter().find(|size| used <= *size).unwrap_or(used);
-        let mut registers = vec![0.0; size];
-        registers[self.inputs.len()..self.first_result()].copy_from_slice(&self.constants);
+        let mut registers = vec![T::ZERO; size];
+        let constants = registers.iter_mut().skip(self.inputs.len()).zip(&self.constants);
+        constants.for_each(|(register, value)| *register = T::splat(*value));
         registers
+    }
+
+    /// Puts the constants of this program into a lane of the registers of another, which differs from it in these alone;
+    /// says whether it does.
+    pub fn put_constants(&self, like: &Program, lane: usize, registers: &mut [Pack]) -> bool {
+        let alike = self.inputs == like.inputs
+            && self.constants.len() == like.constants.len()
+            && self.outputs == like.outputs
+            && self.tables == like.tables
+            && self.code.is_like(&like.code);
+        if alike {
+            put_lane(&mut registers[self.inputs.len()..], lane, &self.constants);
+        }
+        alike
     }
 
     /// Computes all results. `inputs` holds every input by its number; `registers` are those of
@@ -293,17 +346,17 @@ impl Program {
     ///
     /// # Panics
     /// When `inputs` or `registers` are too short: an error of the caller, never of a model.
-    pub fn run(&self, inputs: &[f64], registers: &mut [f64]) {
+    pub fn run<T: Number>(&self, inputs: &[T], registers: &mut [T]) {
         for (register, input) in registers.iter_mut().zip(&self.inputs) {
             *register = inputs[*input as usize];
         }
         if let Code::Many(batches, code) = &self.code {
             self.batches(batches, code, registers);
-        } else if let Ok(file) = <&mut [f64; SMALL]>::try_from(&mut *registers) {
+        } else if let Ok(file) = <&mut [T; SMALL]>::try_from(&mut *registers) {
             self.few(file);
-        } else if let Ok(file) = <&mut [f64; MIDDLE]>::try_from(&mut *registers) {
+        } else if let Ok(file) = <&mut [T; MIDDLE]>::try_from(&mut *registers) {
             self.few(file);
-        } else if let Ok(file) = <&mut [f64; LARGE]>::try_from(&mut *registers) {
+        } else if let Ok(file) = <&mut [T; LARGE]>::try_from(&mut *registers) {
             self.few(file);
         } else {
             let (file, _) = registers.as_chunks_mut::<LARGEST>();
@@ -311,7 +364,7 @@ impl Program {
         }
     }
 
-    fn few<R: Registers<u16>>(&self, r: &mut R) {
+    fn few<T: Number, R: Registers<u16, T>>(&self, r: &mut R) {
         match &self.code {
             Code::Single(code) => self.singles(code, r),
             Code::Few(batches, code) => self.batches(batches, code, r),
@@ -319,7 +372,7 @@ impl Program {
         }
     }
 
-    fn batches<P: Copy, R: Registers<P> + ?Sized>(
+    fn batches<P: Copy, T: Number, R: Registers<P, T> + ?Sized>(
         &self,
         mut batches: &[Batch],
         code: &[[P; 4]],
@@ -332,7 +385,7 @@ impl Program {
             left = rest;
             match *operation {
                 Operation::Unless { register, holds, batches: skipped, instructions } => {
-                    if (r.at(register as usize) != 0.0) != holds {
+                    if r.at(register as usize).every(|value| (value != 0.0) != holds) {
                         batches = &batches[skipped as usize..];
                         left = &left[instructions as usize..];
                     }
@@ -342,13 +395,13 @@ impl Program {
         }
     }
 
-    fn singles<R: Registers<u16>>(&self, code: &[(Operation, [u16; 4])], r: &mut R) {
+    fn singles<T: Number, R: Registers<u16, T>>(&self, code: &[(Operation, [u16; 4])], r: &mut R) {
         let mut left = code;
         while let [(operation, places), rest @ ..] = left {
             left = rest;
             match *operation {
                 Operation::Unless { register, holds, instructions, .. } => {
-                    if (r.at(register as usize) != 0.0) != holds {
+                    if r.at(register as usize).every(|value| (value != 0.0) != holds) {
                         left = &left[instructions as usize..];
                     }
                 }
@@ -358,7 +411,7 @@ impl Program {
     }
 
     #[inline(always)]
-    fn apply<P: Copy, R: Registers<P> + ?Sized>(
+    fn apply<P: Copy, T: Number, R: Registers<P, T> + ?Sized>(
         &self,
         operation: Operation,
         code: &[[P; 4]],
@@ -392,12 +445,12 @@ impl Program {
     }
 
     /// The value of output `k` after a run.
-    pub fn output(&self, k: usize, registers: &[f64]) -> f64 {
+    pub fn output<T: Number>(&self, k: usize, registers: &[T]) -> T {
         registers[self.outputs[k] as usize]
     }
 
     /// The values of all outputs after a run, in order.
-    pub fn outputs<'a>(&'a self, registers: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    pub fn outputs<'a, T: Number>(&'a self, registers: &'a [T]) -> impl Iterator<Item = T> + 'a {
         self.outputs.iter().map(|r| registers[*r as usize])
     }
 
@@ -438,77 +491,77 @@ const LARGEST: usize = 4096;
 const FILES: [usize; 4] = [SMALL, MIDDLE, LARGE, LARGEST];
 
 /// What results are put into and taken from, by numbers of a kind.
-trait Registers<P> {
-    fn at(&self, place: usize) -> f64;
-    fn get(&self, place: P) -> f64;
-    fn put(&mut self, place: P, value: f64);
+trait Registers<P, T> {
+    fn at(&self, place: usize) -> T;
+    fn get(&self, place: P) -> T;
+    fn put(&mut self, place: P, value: T);
 }
 
 /// Of a power of two of registers every number stands for one.
-impl<const SIZE: usize> Registers<u16> for [f64; SIZE] {
+impl<T: Number, const SIZE: usize> Registers<u16, T> for [T; SIZE] {
     #[inline(always)]
-    fn at(&self, place: usize) -> f64 {
+    fn at(&self, place: usize) -> T {
         self[place & (SIZE - 1)]
     }
 
     #[inline(always)]
-    fn get(&self, place: u16) -> f64 {
+    fn get(&self, place: u16) -> T {
         self[place as usize & (SIZE - 1)]
     }
 
     #[inline(always)]
-    fn put(&mut self, place: u16, value: f64) {
+    fn put(&mut self, place: u16, value: T) {
         self[place as usize & (SIZE - 1)] = value;
     }
 }
 
-impl Registers<u32> for [f64] {
+impl<T: Number> Registers<u32, T> for [T] {
     #[inline(always)]
-    fn at(&self, place: usize) -> f64 {
+    fn at(&self, place: usize) -> T {
         self[place]
     }
 
     #[inline(always)]
-    fn get(&self, place: u32) -> f64 {
+    fn get(&self, place: u32) -> T {
         self[place as usize]
     }
 
     #[inline(always)]
-    fn put(&mut self, place: u32, value: f64) {
+    fn put(&mut self, place: u32, value: T) {
         self[place as usize] = value;
     }
 }
 
 #[inline(always)]
-fn three<P: Copy, R: Registers<P> + ?Sized>(
+fn three<P: Copy, T: Number, R: Registers<P, T> + ?Sized>(
     registers: &mut R,
     code: &[[P; 4]],
     f: impl Fn(f64, f64, f64) -> f64,
 ) {
     for &[to, a, b, c] in code {
-        registers.put(to, f(registers.get(a), registers.get(b), registers.get(c)));
+        registers.put(to, registers.get(a).with_two(registers.get(b), registers.get(c), &f));
     }
 }
 
 #[inline(always)]
-fn two<P: Copy, R: Registers<P> + ?Sized>(
+fn two<P: Copy, T: Number, R: Registers<P, T> + ?Sized>(
     registers: &mut R,
     code: &[[P; 4]],
     f: impl Fn(f64, f64) -> f64,
 ) {
     for &[to, a, b, _] in code {
-        registers.put(to, f(registers.get(a), registers.get(b)));
+        registers.put(to, registers.get(a).with(registers.get(b), &f));
     }
 }
 
 #[inline(always)]
-fn one<P: Copy, R: Registers<P> + ?Sized>(
+fn one<P: Copy, T: Number, R: Registers<P, T> + ?Sized>(
     registers: &mut R,
     code: &[[P; 4]],
     f: impl Fn(f64) -> f64,
 ) {
     for &[to, a, ..] in code {
-        registers.put(to, f(registers.get(a)));
+        registers.put(to, registers.get(a).map(&f));
     }
 }
 
@@ -617,6 +670,29 @@ mod tests {
         }
 
         #[test]
+        fn lanes_are_what_each_is_alone(
+            expr in trees(),
+            points in prop::array::uniform4(prop::array::uniform3(-3.0..3.0f64)),
+        ) {
+            let mut dag = Dag::default();
+            let node = add(&mut dag, &expr);
+            let outputs = [node, dag.derivative(node, 0), dag.derivative(node, 1)];
+            let program = Program::compile(&dag, &outputs);
+            let mut inputs = [Pack::ZERO; 3];
+            points.iter().enumerate().for_each(|(lane, x)| put_lane(&mut inputs, lane, x));
+            let mut registers = program.registers();
+            program.run(&inputs, &mut registers);
+            for (k, value) in program.outputs(&registers).enumerate() {
+                for (lane, x) in points.iter().enumerate() {
+                    let mut own = program.registers();
+                    program.run(x, &mut own);
+                    let (value, alone) = (value.0[lane], program.output(k, &own));
+                    prop_assert!(value.to_bits() == alone.to_bits() || (value.is_nan() && alone.is_nan()));
+                }
+            }
+        }
+
+        #[test]
         fn affine_forms_are_right(expr in trees(), x in prop::array::uniform3(-3.0..3.0f64)) {
             let mut dag = Dag::default();
             let node = add(&mut dag, &expr);
@@ -652,6 +728,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn lanes_take_what_differs_in_constants_alone() {
+        let of = |factor: f64, root: bool| {
+            let mut dag = Dag::default();
+            let (x, factor) = (dag.input(0), dag.constant(factor));
+            let product = dag.binary(Binary::Multiply, factor, x);
+            let node = if root { dag.call(Function::Sqrt, &[product]) } else { product };
+            Program::compile(&dag, &[node])
+        };
+        let (one, other, root) = (of(2.5, false), of(-4.0, false), of(2.5, true));
+        let mut registers: Vec<Pack> = one.registers();
+        assert!(other.put_constants(&one, 2, &mut registers));
+        assert!(!root.put_constants(&one, 1, &mut registers));
+        one.run(&[Pack::splat(3.0)], &mut registers);
+        assert_eq!(one.output(0, &registers), Pack([7.5, 7.5, -12.0, 7.5]));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use super::cholesky::{Cholesky, Orders};
 use super::dense::Dense;
+use super::flat::Flat;
 use super::singletons::{Singletons, Unfit};
 use super::{Lu, Pattern, SMALL, Singular};
 
@@ -138,6 +139,14 @@ impl Factors {
                 self.work.copy_from_slice(b);
                 parts.solve(&mut self.work, b);
             }
+        }
+    }
+
+    /// The two triangles as flat lists, where solving goes by these.
+    pub fn flat(&self) -> Option<&Flat<f64>> {
+        match &self.kind {
+            Kind::Whole(lu) => lu.flat(),
+            _ => None,
         }
     }
 

@@ -7,14 +7,16 @@
 //! L works in place on the rows of b, U on the columns of x, so that the order of elimination costs one pass between
 //! them; and the powers of two of R and C go into the entries, which is exact.
 
-use super::Field;
+use super::pack::put_lane;
+use super::{Field, Number, Pack};
+use std::ops::{Mul, Sub};
 
 /// Scales further apart than this do not go into the entries.
 const APART: f64 = 1e150;
 
 /// The two triangles.
 #[derive(Clone, Debug)]
-pub(super) struct Flat<T> {
+pub struct Flat<T> {
     lower: Triangle<T>,
     upper: Triangle<T>,
     /// Row, column and scale of each pivot in the order of elimination, and what it is divided by.
@@ -45,7 +47,7 @@ struct Origin {
 
 /// What a replay is judged by.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Seen {
+pub struct Seen {
     /// The largest part of what its pivot allows that an entry reached; NaN where one is no number.
     pub worst: f64,
     /// The largest magnitude.
@@ -113,7 +115,9 @@ impl<T: Field> Flat<T> {
         }
         seen
     }
+}
 
+impl<T: Copy + Sub<Output = T> + Mul<Output = T>> Flat<T> {
     /// Solves in place; `work` is overwritten.
     pub fn solve(&self, b: &mut [T], work: &mut [T]) {
         self.lower.solve(b);
@@ -148,7 +152,9 @@ impl<T: Field> Triangle<T> {
             origins,
         }
     }
+}
 
+impl<T: Copy + Sub<Output = T> + Mul<Output = T>> Triangle<T> {
     fn solve(&self, x: &mut [T]) {
         let mut take = |[target, source]: [u32; 2], value: T| {
             x[target as usize] = x[target as usize] - value * x[source as usize];
@@ -159,5 +165,42 @@ impl<T: Field> Triangle<T> {
             (0..4).for_each(|k| take(places[k], values[k]));
         }
         last.iter().zip(rest).for_each(|(place, value)| take(*place, *value));
+    }
+}
+
+impl Flat<f64> {
+    /// The same factors in all lanes.
+    pub fn abreast(&self) -> Flat<Pack> {
+        Flat {
+            lower: self.lower.abreast(),
+            upper: self.upper.abreast(),
+            turns: self.turns.clone(),
+            inverse: self.inverse.iter().copied().map(Pack::splat).collect(),
+        }
+    }
+}
+
+impl Flat<Pack> {
+    /// Puts factors into a lane, where they are of the same order; says whether they are.
+    pub fn put(&mut self, flat: &Flat<f64>, lane: usize) -> bool {
+        let mut turns = self.turns.iter().zip(&flat.turns);
+        let alike = self.lower.places == flat.lower.places
+            && self.upper.places == flat.upper.places
+            && self.turns.len() == flat.turns.len()
+            && turns.all(|((own, _), (other, _))| own == other);
+        if alike {
+            put_lane(&mut self.lower.values, lane, &flat.lower.values);
+            put_lane(&mut self.upper.values, lane, &flat.upper.values);
+            put_lane(&mut self.inverse, lane, &flat.inverse);
+        }
+        alike
+    }
+}
+
+impl Triangle<f64> {
+    fn abreast(&self) -> Triangle<Pack> {
+        let Triangle { places, values, .. } = self;
+        let values = values.iter().copied().map(Pack::splat).collect();
+        Triangle { places: places.clone(), values, origins: vec![] }
     }
 }

@@ -243,6 +243,11 @@ impl<T: Field> Lu<T> {
         (&self.floors, GUARD_GROWTH * self.growth)
     }
 
+    /// The factors as solving takes them, where they are few.
+    pub(super) fn flat(&self) -> Option<&Flat<T>> {
+        self.flat.as_ref()
+    }
+
     /// The pivots in the order of elimination, those of the scaled matrix.
     pub fn pivots(&self) -> impl Iterator<Item = T> + '_ {
         self.diagonal.iter().map(|at| self.factors[*at as usize])

@@ -17,6 +17,7 @@
 //! speak of too, a row of several terms is not solved where that takes multiples of others that are, in the equations' own
 //! scales, more than [`THRESHOLD`] times as large.
 
+use super::abreast::{Seat, alone};
 use super::compile::compile;
 use super::driven;
 use super::explain::{Failure, FailureKind};
@@ -57,8 +58,23 @@ pub fn run(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
+    alone(run_in_company(stamps, system, settings, sink, None))
+}
+
+/// The same beside other runs, where there is a place for it: to the last bit what it gives alone.
+///
+/// # Errors
+/// Those of [`transient`](super::transient).
+pub async fn run_in_company(
+    stamps: &Stamps,
+    system: &System,
+    settings: &Settings,
+    sink: &mut dyn Sink,
+    seat: Option<Seat<'_>>,
+) -> Result<Statistics, Failure> {
     let mut counted = Counted { sink, rows: 0 };
-    let failure = match step::transient(system, settings, &mut counted) {
+    let outcome = step::in_company(system, settings, &mut counted, seat).await;
+    let failure = match outcome {
         Err(failure) if failure.kind == FailureKind::NotSolved && system.condensed => failure,
         outcome => return outcome,
     };

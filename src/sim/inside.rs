@@ -4,6 +4,7 @@
 //! frozen network, so that algebraic relations hold. Where that says too little, shorter steps lead from the step's start
 //! to the time: in circuits of index 2, and where a junction bends the solution within the step.
 
+use super::abreast::alone;
 use super::methods::{self, Asked, Dense, Work, trbdf2};
 use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
@@ -187,7 +188,7 @@ impl Inside {
             self.shorter.t = if lands { end } else { self.reached.t + h };
             let (from, to) = (&self.reached, &mut self.shorter);
             let error = beside(network, work, |network, work| {
-                trbdf2::step(network, from, to, weights, work)
+                alone(trbdf2::step(network, from, to, weights, work, None))
             });
             let error = error.unwrap_or(f64::INFINITY);
             if error <= 1.0 {
@@ -228,8 +229,9 @@ impl Inside {
             return Ok(());
         }
         let to = &mut self.point;
-        match beside(network, work, |network, work| trbdf2::step(network, from, to, weights, work))
-        {
+        match beside(network, work, |network, work| {
+            alone(trbdf2::step(network, from, to, weights, work, None))
+        }) {
             Ok(_) => Ok(()),
             Err(cut) => Err(Stopped::Values(time, cut)),
         }

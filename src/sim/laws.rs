@@ -4,6 +4,7 @@ use super::system::Target;
 use crate::circuit::DeviceId;
 use crate::circuit::stamps::Junction;
 use crate::expr::{Dag, NodeId, Program, Unary};
+use crate::linear::Pack;
 
 /// A law on its way into a group.
 pub(crate) struct Placed {
@@ -58,6 +59,33 @@ pub(crate) struct LawSet {
 pub(crate) struct Registers {
     values: Vec<f64>,
     full: Vec<f64>,
+}
+
+/// Room for the values of several sets that differ in their constants alone, one in each lane.
+#[derive(Clone, Debug)]
+pub(crate) struct Abreast {
+    values: Program,
+    registers: Vec<Pack>,
+}
+
+impl Abreast {
+    /// All lanes as those of a set.
+    pub fn new(laws: &LawSet) -> Abreast {
+        Abreast { values: laws.values.clone(), registers: laws.values.registers() }
+    }
+
+    /// Puts a set into a lane; says whether it differs in constants alone.
+    pub fn put(&mut self, laws: &LawSet, lane: usize) -> bool {
+        laws.values.put_constants(&self.values, lane, &mut self.registers)
+    }
+
+    /// Values of all laws.
+    pub fn values(&mut self, inputs: &[Pack], out: &mut [Pack]) {
+        self.values.run(inputs, &mut self.registers);
+        for (out, value) in out.iter_mut().zip(self.values.outputs(&self.registers)) {
+            *out = value;
+        }
+    }
 }
 
 impl LawSet {

@@ -2,7 +2,7 @@
 
 use super::statistics::Statistics;
 use super::system::MatrixPlan;
-use crate::linear::{Factors, Orders, Singular, Unfit};
+use crate::linear::{Factors, Flat, Orders, Singular, Unfit};
 
 /// A matrix of fixed pattern with its factors.
 #[derive(Debug, Default)]
@@ -72,6 +72,11 @@ impl Matrix {
         statistics.symmetric += u64::from(factors.is_symmetric());
         self.factors = Some(factors);
         Ok(())
+    }
+
+    /// Its two triangles as flat lists, where solving goes by these.
+    pub fn flat(&self) -> Option<&Flat<f64>> {
+        self.factors.as_ref()?.flat()
     }
 
     /// Whether its determinant is negative, where that can be told.

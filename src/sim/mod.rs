@@ -3,6 +3,7 @@
 //! [`compile`] once; then an analysis of the table [`ANALYSES`], as often as wanted. Nothing in here knows text: options
 //! come as [`Settings`], rows go to a [`Sink`](crate::trace::Sink), what went wrong comes back as a [`Failure`].
 
+mod abreast;
 mod ac;
 pub mod analyses;
 mod clocks;
@@ -45,9 +46,10 @@ mod tests;
 mod ties;
 
 pub use crate::circuit::stamps::UnknownId;
+pub use abreast::{Group, Seat};
 pub use analyses::{ANALYSES, Job};
-pub use compile::{compile, compile_for_run};
-pub use condense::run;
+pub use compile::{compile, compile_for_run, compile_like};
+pub use condense::{run, run_in_company};
 pub use explain::{Failure, FailureKind};
 pub use linearise::{Charge, Input as Source, Linear};
 pub use methods::{METHODS, Method};

@@ -5,6 +5,7 @@
 //! derivatives. Now and then ρ is measured again. Where it is large, the stage is solved by Newton's method with new
 //! factors.
 
+use super::abreast::Company;
 use super::methods::weighted;
 use super::network::Network;
 use super::newton::{GROWN, MEASURED_AGAIN, Scratch, Stage, stage_residual};
@@ -57,33 +58,39 @@ impl Near {
     }
 }
 
-/// Solves a stage with the factors at hand. Says whether it has; otherwise `x` is a guess as good as before, or better.
-pub(crate) fn solve(
-    network: &mut Network,
-    stage: &Stage,
-    x: &mut [f64],
-    q: &mut [f64],
-    scratch: &mut Scratch,
-) -> bool {
+/// Whether a stage may be solved with the factors at hand.
+pub(crate) fn may_solve(network: &Network, stage: &Stage, x: &[f64], near: &mut Near) -> bool {
     if !network.factors_serve(stage.alpha) || !network.junctions_rest(x) {
         return false;
     }
-    if scratch.near.wait > 0 {
-        scratch.near.wait -= 1;
-        return false;
-    }
+    let waits = near.wait > 0;
+    near.wait = near.wait.saturating_sub(1);
+    !waits
+}
+
+/// Solves a stage with the factors at hand. Says whether it has; otherwise `x` is a guess as good as before, or better.
+pub(crate) async fn solve(
+    network: &mut Network<'_>,
+    stage: &Stage<'_>,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+    company: Company<'_>,
+) -> bool {
     let n = x.len();
     scratch.guess.copy_from_slice(x);
-    let Some(first) = iterate(network, stage, x, q, scratch) else { return false };
+    let Some(update) = iterate(network, stage, x, q, scratch, company).await else { return false };
+    let first = update.size;
     let Scratch { near, residual, .. } = scratch;
     let known = GROWN * near.rate * first <= stage.unconfirmed && near.age < near.trusted;
     if first == 0.0 || (known && (first <= NEAR || network.meets_no_kink(x))) {
         near.age += 1;
         near.twice = 0;
-        network.add_charge_change(-1.0, &residual[..n], q);
+        update.follow(network, &residual[..n], q);
         return true;
     }
-    let Some(second) = iterate(network, stage, x, q, scratch) else { return false };
+    let Some(update) = iterate(network, stage, x, q, scratch, company).await else { return false };
+    let second = update.size;
     let Scratch { near, residual, .. } = scratch;
     let rate = second / first;
     if rate > SLOW || rate / (1.0 - rate) * second > stage.unconfirmed {
@@ -102,33 +109,57 @@ pub(crate) fn solve(
     if near.twice >= TWICE && network.system.has_junctions() {
         (near.twice, near.wait) = (0, CHEAPER);
     }
-    network.add_charge_change(-1.0, &residual[..n], q);
+    update.follow(network, &residual[..n], q);
     true
 }
 
-/// One iteration, with what it has subtracted from `x` in the residual's place. Gives its weighted size; nothing where it
-/// is no number.
-fn iterate(
-    network: &mut Network,
-    stage: &Stage,
+/// What an iteration did.
+struct Update {
+    /// The weighted size of what it has subtracted from the unknowns.
+    size: f64,
+    /// Whether linear charges have followed already.
+    followed: bool,
+}
+
+impl Update {
+    /// Lets the charges follow what was subtracted, with the linear terms, as the equations just solved have them.
+    fn follow(self, network: &Network, subtracted: &[f64], q: &mut [f64]) {
+        if !self.followed {
+            network.add_linear_change(-1.0, subtracted, q);
+        }
+        network.add_curved_change(-1.0, subtracted, q);
+    }
+}
+
+/// One iteration, with what it has subtracted from `x` in the residual's place; nothing where that is no number.
+async fn iterate(
+    network: &mut Network<'_>,
+    stage: &Stage<'_>,
     x: &mut [f64],
     q: &mut [f64],
     scratch: &mut Scratch,
-) -> Option<f64> {
+    company: Company<'_>,
+) -> Option<Update> {
     let n = x.len();
     network.statistics.iterations += 1;
-    network.evaluate(x, stage.t);
-    network.charges(x, q);
     let residual = &mut scratch.residual[..n];
-    stage_residual(network, stage, x, q, residual, &mut scratch.rates);
-    network.solve_dynamic(residual);
-    let update = weighted(residual, stage.weights);
-    if !update.is_finite() {
+    let followed = match company {
+        Some(seated) => seated.iterate(network, stage, x, q, residual).await,
+        None => false,
+    };
+    if !followed {
+        network.evaluate(x, stage.t);
+        network.charges(x, q);
+        stage_residual(network, stage, x, q, residual, &mut scratch.rates);
+        network.solve_dynamic(residual);
+    }
+    let size = weighted(residual, stage.weights);
+    if !size.is_finite() {
         scratch.near.failed();
         return None;
     }
     for (x, dx) in x.iter_mut().zip(residual.iter()) {
         *x -= dx;
     }
-    Some(update)
+    Some(Update { size, followed })
 }

@@ -12,7 +12,7 @@ use super::op::State;
 use super::statistics::Statistics;
 use super::system::{LawGroup, System, Target};
 use crate::circuit::waveform::Segment;
-use crate::linear::{Orders, Singular};
+use crate::linear::{Flat, Orders, Singular};
 use crate::quantity::random;
 
 /// The conductance that pins a node to its `.ic` value, as in SPICE.
@@ -60,8 +60,9 @@ struct Stages {
     matrix: Matrix,
     /// α of the factors, where they depend on nothing else.
     constant_alpha: Option<f64>,
-    /// α of the factors, whatever else they depend on.
+    /// α of the factors, whatever else they depend on, and how many were made until then.
     alpha: Option<f64>,
+    number: u64,
     /// Junction voltages that they were made at.
     voltages: Vec<f64>,
 }
@@ -217,11 +218,29 @@ impl<'a> Network<'a> {
         }
     }
 
+    /// Whether its equations are the circuit's own, as they are but while an operating point is sought.
+    pub fn is_plain(&self) -> bool {
+        self.gmin == 0.0 && self.pins.is_empty()
+    }
+
+    /// The factors at hand as flat lists, where they are such, with their number in the order in which they were made.
+    pub fn dynamic_factors(&self) -> (u64, Option<&Flat<f64>>) {
+        (self.stages.number, self.stages.matrix.flat())
+    }
+
     fn set_inputs(&mut self, x: &[f64], t: f64) {
         let time = self.system.time_input;
         self.inputs[..x.len()].copy_from_slice(x);
         self.inputs[time] = t;
         self.inputs[time + 1..time + 1 + self.modes.len()].copy_from_slice(&self.modes);
+    }
+
+    /// Values of a group of laws that are affine for fixed modes, at a point.
+    pub fn modal_values(&mut self, group: usize, x: &[f64], t: f64) -> &[f64] {
+        self.set_inputs(x, t);
+        let state = &mut self.groups[group];
+        state.follow(&self.system.groups[group].laws, &mut self.inputs);
+        &state.values
     }
 
     /// Values of all laws at a point.
@@ -372,7 +391,7 @@ impl<'a> Network<'a> {
     }
 
     /// r = −b
-    fn begin_residual(&self, t: f64, r: &mut [f64]) {
+    pub fn begin_residual(&self, t: f64, r: &mut [f64]) {
         r.copy_from_slice(&self.rest);
         for k in self.moving.iter().map(|k| *k as usize) {
             let value = self.drive * self.segments[k].value(t);
@@ -473,7 +492,17 @@ impl<'a> Network<'a> {
 
     /// y += factor·(C + q')·u, with the derivatives of the last linearisation.
     pub fn add_charge_change(&self, factor: f64, u: &[f64], y: &mut [f64]) {
+        self.add_linear_change(factor, u, y);
+        self.add_curved_change(factor, u, y);
+    }
+
+    /// y += factor·C·u
+    pub fn add_linear_change(&self, factor: f64, u: &[f64], y: &mut [f64]) {
         self.system.charges.add_product(factor, u, y);
+    }
+
+    /// y += factor·q'·u, with the derivatives of the last linearisation.
+    pub fn add_curved_change(&self, factor: f64, u: &[f64], y: &mut [f64]) {
         for (state, group) in self.groups.iter().zip(&self.system.groups) {
             for (partial, charge, unknown) in &group.charge_slopes {
                 y[*charge as usize] +=
@@ -534,6 +563,7 @@ impl<'a> Network<'a> {
         let constant = result.is_ok() && self.system.is_linear();
         stages.constant_alpha = constant.then_some(alpha);
         stages.alpha = result.is_ok().then_some(alpha);
+        stages.number = self.statistics.factorisations + self.statistics.refactorisations;
         result
     }
 

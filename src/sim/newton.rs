@@ -1,5 +1,6 @@
 //! Newton's method on a step's equations and on the frozen network, with tests of both update and residual.
 
+use super::abreast::Company;
 use super::near::{self, Near};
 use super::network::Network;
 use super::op::State;
@@ -124,7 +125,25 @@ pub(crate) struct Stage<'a> {
 }
 
 /// Solves a stage from the guess in `x`; leaves Q(x) in `q`, and the last factors of W(α) in the network.
-pub(crate) fn solve_stage(
+pub(crate) async fn solve_stage(
+    network: &mut Network<'_>,
+    stage: &Stage<'_>,
+    x: &mut [f64],
+    q: &mut [f64],
+    scratch: &mut Scratch,
+    company: Company<'_>,
+) -> Result<(), Cut> {
+    let near = !network.system.is_linear()
+        && stage.unconfirmed > 0.0
+        && near::may_solve(network, stage, x, &mut scratch.near);
+    if near && near::solve(network, stage, x, q, scratch, company).await {
+        return Ok(());
+    }
+    solve_anew(network, stage, x, q, scratch)
+}
+
+/// The same with new factors for each iteration.
+pub(crate) fn solve_anew(
     network: &mut Network,
     stage: &Stage,
     x: &mut [f64],
@@ -133,9 +152,6 @@ pub(crate) fn solve_stage(
 ) -> Result<(), Cut> {
     if network.system.is_linear() {
         return solve_linear(network, stage, x, q, scratch);
-    }
-    if stage.unconfirmed > 0.0 && near::solve(network, stage, x, q, scratch) {
-        return Ok(());
     }
     let n = x.len();
     let mut before = f64::INFINITY;

@@ -14,15 +14,24 @@ pub(crate) fn left_over(system: &System, rows: &[(usize, f64, f64)], x: &[f64]) 
     let mut spoken_of: Vec<usize> = vec![];
     for (row, left, size) in rows {
         let (what, _) = equation(system, *row);
-        let unit = if *row < system.nodes { "A" } else { "V" };
-        let unit = if system.spoken.is_empty() { format!(" {unit}") } else { String::new() };
+        // Behind the equations stand the charges, in As or Vs.
+        let charge = row.checked_sub(system.equations());
+        let unit = match (system.spoken.is_empty(), charge) {
+            (true, None) if *row < system.nodes => " A",
+            (true, None) => " V",
+            _ => "",
+        };
         notes.push(format!(
             "{what}: {}{unit} are left over, of terms of {}{unit}{}",
             three_figures(*left),
             three_figures(*size),
             elements(system, *row),
         ));
-        spoken_of.extend(system.conductances.row(*row).map(|(column, _)| column));
+        let terms = match charge {
+            Some(charge) => system.charges.row(charge),
+            None => system.conductances.row(*row),
+        };
+        spoken_of.extend(terms.map(|(column, _)| column));
         for group in &system.groups {
             for (o, target) in group.targets.iter().enumerate() {
                 let Target::Equations(into) = target else { continue };

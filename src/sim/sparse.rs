@@ -1,8 +1,10 @@
 //! Sparse matrices of short rows, for products: rows of equal length stand together, so that none needs a loop of its own.
 
+use crate::linear::{Number, Pack, put_lane};
+
 /// A list of rows, each a few entries.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rows {
+pub(crate) struct Rows<T = f64> {
     /// Where each row's entries stand.
     spans: Vec<[u32; 2]>,
     /// The rows by their number of entries, as the entries stand.
@@ -10,7 +12,7 @@ pub(crate) struct Rows {
     /// Where in `order` the rows of 0, 1, 2, 3, 4 entries end.
     ends: [u32; SHORT + 1],
     columns: Vec<u32>,
-    values: Vec<f64>,
+    values: Vec<T>,
 }
 
 /// Rows of up to so many entries are short.
@@ -89,9 +91,7 @@ impl Rows {
 
     /// Entries of a row.
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let [from, to] = self.spans[row];
-        let range = from as usize..to as usize;
-        self.columns[range.clone()].iter().zip(&self.values[range]).map(|(c, v)| (*c as usize, *v))
+        self.entries_of(row)
     }
 
     /// All entries as (row, column, value).
@@ -100,51 +100,78 @@ impl Rows {
             .flat_map(move |row| self.row(row).map(move |(column, value)| (row, column, value)))
     }
 
+    /// The same rows in all lanes.
+    pub fn abreast(&self) -> Rows<Pack> {
+        let Rows { spans, order, ends, columns, values } = self.clone();
+        let values = values.into_iter().map(Pack::splat).collect();
+        Rows { spans, order, ends, columns, values }
+    }
+}
+
+impl Rows<Pack> {
+    /// Puts values into a lane, where they stand at the same places; says whether they do.
+    pub fn put(&mut self, rows: &Rows, lane: usize) -> bool {
+        let alike = self.spans == rows.spans && self.columns == rows.columns;
+        if alike {
+            put_lane(&mut self.values, lane, &rows.values);
+        }
+        alike
+    }
+}
+
+impl<T: Number> Rows<T> {
+    fn entries_of(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        let [from, to] = self.spans[row];
+        let range = from as usize..to as usize;
+        self.columns[range.clone()].iter().zip(&self.values[range]).map(|(c, v)| (*c as usize, *v))
+    }
+
     /// y += factor·(rows · x)
-    pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+    pub fn add_product(&self, factor: T, x: &[T], y: &mut [T]) {
         self.add_short::<1>(factor, x, y);
         self.add_short::<2>(factor, x, y);
         self.add_short::<3>(factor, x, y);
         self.add_short::<4>(factor, x, y);
         for row in self.long() {
-            let sum: f64 = self.row(row).map(|(column, value)| value * x[column]).sum();
-            y[row] += factor * sum;
+            let terms = self.entries_of(row).map(|(column, value)| value * x[column]);
+            y[row] = y[row] + factor * terms.fold(T::ZERO, |sum, term| sum + term);
         }
     }
 
-    fn add_short<const N: usize>(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+    fn add_short<const N: usize>(&self, factor: T, x: &[T], y: &mut [T]) {
         for (row, columns, values) in self.short::<N>() {
-            let mut sum = 0.0;
+            let mut sum = T::ZERO;
             for (column, value) in columns.iter().zip(values) {
-                sum += value * x[*column as usize];
+                sum = sum + *value * x[*column as usize];
             }
-            y[*row as usize] += factor * sum;
+            y[*row as usize] = y[*row as usize] + factor * sum;
         }
     }
 
     /// y += factor·(transpose · w): rows are scattered into the places their columns name.
-    pub fn add_transposed(&self, factor: f64, w: &[f64], y: &mut [f64]) {
+    pub fn add_transposed(&self, factor: T, w: &[T], y: &mut [T]) {
         self.scatter_short::<1>(factor, w, y);
         self.scatter_short::<2>(factor, w, y);
         self.scatter_short::<3>(factor, w, y);
         self.scatter_short::<4>(factor, w, y);
         for row in self.long() {
-            self.row(row).for_each(|(column, value)| y[column] += factor * w[row] * value);
+            let scaled = factor * w[row];
+            self.entries_of(row).for_each(|(column, value)| y[column] = y[column] + scaled * value);
         }
     }
 
-    fn scatter_short<const N: usize>(&self, factor: f64, w: &[f64], y: &mut [f64]) {
+    fn scatter_short<const N: usize>(&self, factor: T, w: &[T], y: &mut [T]) {
         for (row, columns, values) in self.short::<N>() {
             let scaled = factor * w[*row as usize];
             for (column, value) in columns.iter().zip(values) {
-                y[*column as usize] += scaled * value;
+                y[*column as usize] = y[*column as usize] + scaled * *value;
             }
         }
     }
 
     /// The rows of N entries.
     #[inline]
-    fn short<const N: usize>(&self) -> impl Iterator<Item = (&u32, &[u32; N], &[f64; N])> {
+    fn short<const N: usize>(&self) -> impl Iterator<Item = (&u32, &[u32; N], &[T; N])> {
         let [first, end] = [self.ends[N - 1] as usize, self.ends[N] as usize];
         let rows = &self.order[first..end];
         let at = rows.first().map_or(0, |row| self.spans[*row as usize][0] as usize);

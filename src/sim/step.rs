@@ -20,6 +20,7 @@ use self::layer::Layer;
 use self::rounding::Rounding;
 use self::trouble::Cuts;
 pub(crate) use self::trouble::{Reason, Stuck};
+use super::abreast::{Company, Seat, alone};
 use super::events::{Controls, Track};
 use super::explain::{Failure, FailureKind, Moment, failure};
 use super::inside::Inside;
@@ -81,12 +82,26 @@ pub fn transient(
     settings: &Settings,
     sink: &mut dyn Sink,
 ) -> Result<Statistics, Failure> {
+    alone(in_company(system, settings, sink, None))
+}
+
+/// The same beside other runs, where there is a place for it.
+///
+/// # Errors
+/// Those of [`transient`].
+pub(super) async fn in_company(
+    system: &System,
+    settings: &Settings,
+    sink: &mut dyn Sink,
+    seat: Option<Seat<'_>>,
+) -> Result<Statistics, Failure> {
+    let seated = seat.and_then(|seat| seat.take(system));
     // Exponentials take what is moved from what they find.
     let far = exponential::suits(system, settings);
-    let pilot = if far { None } else { pilot(system, settings)? };
+    let pilot = if far { None } else { pilot(system, settings, seated.as_ref()).await? };
     let mut run = Run::new(system, settings, pilot.as_ref(), Some(sink));
     run.goes_far = far;
-    run.run()?;
+    run.run(seated.as_ref()).await?;
     Ok(run.network.statistics)
 }
 
@@ -99,7 +114,11 @@ struct Seen {
 }
 
 /// A coarse run beforehand, where floors follow magnitudes.
-fn pilot(system: &System, settings: &Settings) -> Result<Option<Seen>, Failure> {
+async fn pilot(
+    system: &System,
+    settings: &Settings,
+    company: Company<'_>,
+) -> Result<Option<Seen>, Failure> {
     /// Magnitudes are factors of floors: a tenth is more than is asked of them. Steps of low order, and with few solutions,
     /// are the cheapest then.
     const PILOT: f64 = 1e-1;
@@ -115,7 +134,7 @@ fn pilot(system: &System, settings: &Settings) -> Result<Option<Seen>, Failure> 
     let coarse = Settings { method, reltol: PILOT, hmax: None, h0: None, ..settings.clone() };
     let mut run = Run::new(system, &coarse, None, None);
     run.enough = enough(system, settings);
-    match run.run() {
+    match run.run(company).await {
         Ok(()) => {
             let Network { statistics, tracks, orders, .. } = run.network;
             Ok(Some(Seen { largest: run.largest, statistics, tracks, orders }))
@@ -328,14 +347,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn run(&mut self) -> Result<(), Failure> {
+    async fn run(&mut self, company: Company<'_>) -> Result<(), Failure> {
         self.start()?;
         while self.state.t < self.settings.stop - self.smallest {
             if self.rows.is_none() && self.has_seen_enough() {
                 return Ok(());
             }
             self.check_interrupt()?;
-            let (corner, event) = self.advance()?;
+            let (corner, event) = self.advance(company).await?;
             if self.settings.jumps == Side::Before {
                 self.rows_at_state()?;
             }
@@ -372,7 +391,7 @@ impl<'a> Run<'a> {
     }
 
     /// One accepted step. Says whether it ended on a corner, and on which mode's threshold.
-    fn advance(&mut self) -> Result<(bool, Option<usize>), Failure> {
+    async fn advance(&mut self, company: Company<'_>) -> Result<(bool, Option<usize>), Failure> {
         let corner = self.network.next_corner().min(self.settings.stop);
         let mut remaining = corner - self.state.t;
         let mut power = self.method.error_power();
@@ -396,7 +415,8 @@ impl<'a> Run<'a> {
             self.next.t = if lands { corner } else { self.state.t + h };
             h = self.next.t - self.state.t;
             let Run { network, state, next, weights, work, .. } = self;
-            let mut outcome = methods::step(self.method, network, state, next, weights, work);
+            let step = methods::step(self.method, network, state, next, weights, work, company);
+            let mut outcome = step.await;
             if matches!(outcome, Ok(error) if error <= 1.0) && self.loses_its_way() {
                 self.work.linearised = false;
                 outcome = Ok(LOST);

@@ -427,3 +427,15 @@ fn a_switch_without_hysteresis_turns_at_each_crossing() {
         close(row[2], exact * 1e3 / (1e3 + resistance), 1e-3);
     }
 }
+
+#[test]
+fn a_charge_that_folds_back_ends_the_solution() {
+    // `^` takes magnitudes: Q has an extreme at -1.83 V. A coarse run beforehand finds no charges at a corner on its way,
+    // and what it would say of that speaks of a charge, not of an equation.
+    let deck = "Vs s 0 SIN(0 3.490609322579473 2k)\nRs s in 10\nC1 in 0 Q={1u*v(in)+0.1u*v(in)^3}\n\
+        T1 in 0 far 0 Z0=50 TD=20u\nRfar far 0 587.3065747400642\n\
+        B1 in mid I={1e-3*tanh(1.431713324480724*v(in,mid))}\nC2 mid 0 1u\n\
+        B2 mid 0 I={if(v(mid)>0.2,2e-3,1e-3)*v(mid)}\nL1 mid end 1m\nRe end 0 10\n.save v(in) v(far) i(l1)\n\
+        .tran 50u 6m 0 50u uic";
+    fails(deck, 4, &["the step became too small", "the sum of currents at the node of v(in)"]);
+}

@@ -19,4 +19,5 @@ mod expressions_in_ngspice;
 mod formats;
 mod reading;
 mod xyce;
+mod abreast;
 mod allocations;

@@ -4,11 +4,11 @@ use super::Sweep;
 use crate::analysis::sweep::Setting;
 use crate::bond::elaborate::Overrides;
 use crate::circuit::{Circuit, Output};
-use crate::cli::pipeline::{Language, language};
+use crate::cli::pipeline::{self, Deck, Language, language};
 use crate::cli::run::{self, Run};
 use crate::cli::session::{Exit, Session};
 use crate::diagnostic::{Diagnostic, Severity, has_errors};
-use crate::sim::FailureKind;
+use crate::sim::{FailureKind, Seat};
 use crate::source::{SourceMap, Span};
 use crate::trace::formats::Heading;
 use crate::trace::measure::{Measure, Outcome};
@@ -27,6 +27,9 @@ pub struct Runner<'a> {
     items: Vec<String>,
     places: Vec<usize>,
     traces: Option<PathBuf>,
+    /// What all runs have in common: the netlist as it was read, and a run that others may be like.
+    deck: Option<Deck>,
+    first: Option<Box<Run>>,
 }
 
 /// A row of the table.
@@ -62,18 +65,28 @@ impl<'a> Runner<'a> {
             std::fs::create_dir_all(folder).map_err(|error| session.unwritable(folder, &error))?;
         }
         let bond = language(&session.map, sweep.file) == Language::Bond;
-        Ok(Runner { sweep, bond, items, places, traces: traces.map(PathBuf::from) })
+        let traces = traces.map(PathBuf::from);
+        Ok(Runner { sweep, bond, items, places, traces, deck: None, first: None })
     }
 
     /// The header of the table, from a run that is only prepared.
     pub fn header(
-        &self,
+        &mut self,
         run: u64,
         map: &mut SourceMap,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Vec<String>> {
         let settings = self.sweep.space.settings(run);
+        if !self.bond {
+            self.deck = Some(pipeline::deck(map, self.sweep.file, &self.overrides(), d)?);
+        }
         let prepared = self.prepare(&settings, map, d)?;
+        let header = self.header_of(&prepared, d);
+        self.first = Some(Box::new(prepared));
+        header
+    }
+
+    fn header_of(&self, prepared: &Run, d: &mut Vec<Diagnostic>) -> Option<Vec<String>> {
         let measures: Vec<&str> =
             prepared.measures().map(|measure| measure.name.as_str()).collect();
         if measures.is_empty() && self.traces.is_none() {
@@ -104,25 +117,41 @@ impl<'a> Runner<'a> {
         map: &mut SourceMap,
         d: &mut Vec<Diagnostic>,
     ) -> Option<Run> {
-        let mut overrides: Overrides = self.sweep.overrides.clone();
         let set = settings.iter().map(|setting| (setting.name.clone(), setting.text.clone()));
-        overrides.set.extend(set);
-        if !self.items.is_empty() {
-            // What is measured stands last, behind the columns of a trace.
-            let own = overrides.observe.take().filter(|_| self.traces.is_some());
-            let items = own.into_iter().chain(self.items.iter().cloned());
-            overrides.observe = Some(items.collect::<Vec<_>>().join(", "));
-        }
         let before = d.len();
         let mut complete =
             |circuit: &mut Circuit, d: &mut Vec<Diagnostic>| self.measure(circuit, d);
-        let run = run::prepare_with(map, self.sweep.file, &overrides, None, &mut complete, d)?;
+        let like = self.first.as_deref();
+        let run = match &self.deck {
+            Some(deck) => {
+                let deck = deck.set(&set.collect::<Vec<_>>(), d);
+                run::prepare_deck(deck, None, &mut complete, like, d)?
+            }
+            None => {
+                let mut overrides = self.overrides();
+                overrides.set.extend(set);
+                let file = self.sweep.file;
+                run::prepare_with(map, file, &overrides, None, &mut complete, like, d)?
+            }
+        };
         if !run.steps.is_empty() {
             let error =
                 Diagnostic::error("E1202", Span::NONE, "the netlist has a `.step` of its own");
             d.push(error.help("leave it out, and vary its parameter with --vary"));
         }
         (!has_errors(&d[before..])).then_some(run)
+    }
+
+    /// What the command line says of every run.
+    fn overrides(&self) -> Overrides {
+        let mut overrides = self.sweep.overrides.clone();
+        if !self.items.is_empty() {
+            // What is measured stands last, behind the columns of a trace.
+            let own = overrides.observe.take().filter(|_| self.traces.is_some());
+            let items = own.into_iter().chain(self.items.iter().cloned());
+            overrides.observe = Some(items.collect::<Vec<_>>().join(", "));
+        }
+        overrides
     }
 
     /// Adds the measures of the sweep to those of a circuit, over the columns that were added last.
@@ -145,13 +174,18 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Makes a run; nothing where it was interrupted.
-    pub fn run(&self, run: u64, map: &SourceMap, stop: &Arc<AtomicBool>) -> Option<Row> {
+    /// Makes a run beside others; nothing where it was interrupted.
+    pub async fn run(
+        &self,
+        run: u64,
+        map: &SourceMap,
+        stop: &Arc<AtomicBool>,
+        seat: Seat<'_>,
+    ) -> Option<Row> {
         let settings = self.sweep.space.settings(run);
-        let mut map = map.clone();
         let mut d = vec![];
         let mut row = Row { run, settings, values: vec![], failure: None };
-        let Some(mut prepared) = self.prepare(&row.settings, &mut map, &mut d) else {
+        let Some(mut prepared) = self.prepare(&row.settings, &mut map.clone(), &mut d) else {
             let error = d.into_iter().find(|d| d.severity == Severity::Error);
             row.failure = error.map(Box::new);
             return Some(row);
@@ -160,7 +194,7 @@ impl<'a> Runner<'a> {
         if self.traces.is_none() {
             prepared.keep_no_rows();
         }
-        let outcome = self.simulate(run, &prepared);
+        let outcome = self.simulate(run, &prepared, seat).await;
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -171,19 +205,24 @@ impl<'a> Runner<'a> {
         Some(row)
     }
 
-    fn simulate(&self, run: u64, prepared: &Run) -> Result<Vec<Outcome>, Box<Diagnostic>> {
+    async fn simulate(
+        &self,
+        run: u64,
+        prepared: &Run,
+        seat: Seat<'_>,
+    ) -> Result<Vec<Outcome>, Box<Diagnostic>> {
         let file = |error: io::Error, name: &PathBuf| {
             Box::new(crate::diagnostic::files::unwritable(&name.to_string_lossy(), &error))
         };
         let (result, taken) = match &self.traces {
-            None => prepared.go_measured(&mut Nowhere),
+            None => prepared.go_beside(&mut Nowhere, seat).await,
             Some(folder) => {
                 let name = folder.join(format!("run-{run}.csv"));
                 let heading = Heading { title: String::new(), units: false };
                 let to = File::create(&name).map(BufWriter::new).map_err(|e| file(e, &name))?;
                 let rows = csv::Rows::new(to, &heading, &prepared.names, &prepared.units);
                 let mut rows = rows.map_err(|error| file(error, &name))?;
-                let outcome = prepared.go_measured(&mut rows);
+                let outcome = prepared.go_beside(&mut rows, seat).await;
                 rows.finish().map_err(|error| file(error, &name))?;
                 outcome
             }

@@ -18,6 +18,7 @@ use super::small::{Exponentials, identity};
 use super::{Work, trbdf2};
 use crate::circuit::Waveform;
 use crate::linear::{dot, eliminate};
+use crate::sim::abreast::alone;
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Frozen, correct_frozen};
 use crate::sim::op::State;
@@ -112,7 +113,7 @@ pub(crate) fn step(
     work: &mut Work,
 ) -> Result<f64, Cut> {
     let Some(mut space) = work.dense.space.take() else {
-        return trbdf2::step(network, from, to, weights, work);
+        return alone(trbdf2::step(network, from, to, weights, work, None));
     };
     let outcome = space.step(network, from, to, weights, work);
     work.dense.space = Some(space);

@@ -10,19 +10,21 @@
 
 use super::trapezoidal::{SURE, led_away, second_difference};
 use super::{Work, filtered_error, trbdf2, weighted};
+use crate::sim::abreast::Company;
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::State;
 
-pub(crate) fn step(
-    network: &mut Network,
+pub(crate) async fn step(
+    network: &mut Network<'_>,
     from: &State,
     to: &mut State,
     weights: &[f64],
     work: &mut Work,
+    company: Company<'_>,
 ) -> Result<f64, Cut> {
     let Some(before) = work.history.before() else {
-        return trbdf2::step(network, from, to, weights, work);
+        return trbdf2::step(network, from, to, weights, work, company).await;
     };
     let h = to.t - from.t;
     let last = from.t - before;
@@ -37,7 +39,7 @@ pub(crate) fn step(
         *beta = (ratio * ratio / (1.0 + ratio) * history.q[k] - (1.0 + ratio) * from.q[k]) / h;
     }
     let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION, unconfirmed };
-    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
+    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch, company).await?;
     let constant = (1.0 + ratio) * (1.0 + ratio) / (ratio * (1.0 + 2.0 * ratio));
     for (k, rate) in to.w.iter_mut().enumerate() {
         *rate = alpha * to.q[k] + beta[k];

@@ -10,6 +10,7 @@ pub mod trbdf2;
 
 use self::exponential::Space;
 use self::history::History;
+use super::abreast::Company;
 use super::network::Network;
 use super::newton::{Cut, Scratch};
 use super::op::State;
@@ -350,22 +351,31 @@ impl Work {
 }
 
 /// One step of a method from `from` to `to.t`; `weights` are those of the error test. Gives the largest weighted error.
-pub(crate) fn step(
+pub(crate) async fn step(
     method: Method,
-    network: &mut Network,
+    network: &mut Network<'_>,
     from: &State,
     to: &mut State,
     weights: &[f64],
     work: &mut Work,
+    company: Company<'_>,
 ) -> Result<f64, Cut> {
     match method {
-        Method::Rodas3 => rodas::step(&rodas::RODAS3, network, from, to, weights, work),
-        Method::Rodas4 => rodas::step(&rodas::RODAS4P, network, from, to, weights, work),
-        Method::Rodas5p => rodas::step(&rodas::RODAS5P, network, from, to, weights, work),
-        Method::Trapezoidal => trapezoidal::step(network, from, to, weights, work),
-        Method::Gear2 => gear2::step(network, from, to, weights, work),
+        Method::Rodas3 => {
+            rodas::step(&rodas::RODAS3, network, from, to, weights, work, company).await
+        }
+        Method::Rodas4 => {
+            rodas::step(&rodas::RODAS4P, network, from, to, weights, work, company).await
+        }
+        Method::Rodas5p => {
+            rodas::step(&rodas::RODAS5P, network, from, to, weights, work, company).await
+        }
+        Method::Trapezoidal => trapezoidal::step(network, from, to, weights, work, company).await,
+        Method::Gear2 => gear2::step(network, from, to, weights, work, company).await,
         Method::Exponential => exponential::step(network, from, to, weights, work),
-        Method::TrBdf2 | Method::Auto => trbdf2::step(network, from, to, weights, work),
+        Method::TrBdf2 | Method::Auto => {
+            trbdf2::step(network, from, to, weights, work, company).await
+        }
     }
 }
 

@@ -14,6 +14,7 @@
 
 use super::{Work, add, weighted};
 use crate::linear::Cause;
+use crate::sim::abreast::Company;
 use crate::sim::network::Network;
 use crate::sim::newton::Cut;
 use crate::sim::op::State;
@@ -105,13 +106,14 @@ pub(crate) const RODAS5P: Tableau = Tableau {
     ],
 };
 
-pub(crate) fn step(
+pub(crate) async fn step(
     tableau: &Tableau,
-    network: &mut Network,
+    network: &mut Network<'_>,
     from: &State,
     to: &mut State,
     weights: &[f64],
     work: &mut Work,
+    company: Company<'_>,
 ) -> Result<f64, Cut> {
     let n = from.x.len();
     let charges = from.q.len();
@@ -147,7 +149,23 @@ pub(crate) fn step(
             add(1.0, &uq[(i - 1) * charges..i * charges], &mut to.q);
         }
         let t = from.t + tableau.at.get(i).unwrap_or(&1.0) * h;
-        if i > 0 || !fresh {
+        let evaluated = i > 0 || !fresh;
+        sum.fill(0.0);
+        if let Some(row) = i.checked_sub(1).and_then(|r| tableau.c.get(r)) {
+            for (j, c) in row.iter().enumerate() {
+                add(c / h, &uq[j * charges..(j + 1) * charges], sum);
+            }
+        }
+        let v = &mut uq[i * charges..(i + 1) * charges];
+        if let Some(seated) = company.filter(|_| !curved) {
+            let by_time = tableau.d.get(i).map(|d| (d * h, &slopes[..]));
+            if seated.stage(network, (t, &to.x), by_time, sum, [&mut *right, &mut *v]).await {
+                network.statistics.evaluations += u64::from(evaluated);
+                ux[i * n..(i + 1) * n].copy_from_slice(right);
+                continue;
+            }
+        }
+        if evaluated {
             network.evaluate(&to.x, t);
         }
         network.residual(&to.x, t, right);
@@ -157,13 +175,6 @@ pub(crate) fn step(
         if let Some(d) = tableau.d.get(i) {
             add(d * h, slopes, right);
         }
-        sum.fill(0.0);
-        if let Some(row) = i.checked_sub(1).and_then(|r| tableau.c.get(r)) {
-            for (j, c) in row.iter().enumerate() {
-                add(c / h, &uq[j * charges..(j + 1) * charges], sum);
-            }
-        }
-        let v = &mut uq[i * charges..(i + 1) * charges];
         v.fill(0.0);
         if curved {
             network.charges(&to.x, q);

@@ -6,6 +6,7 @@
 //! there is no past at all, one TR-BDF2 step is taken.
 
 use super::{Work, filtered_error, trbdf2, weighted};
+use crate::sim::abreast::Company;
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::State;
@@ -13,15 +14,16 @@ use crate::sim::op::State;
 /// The local error is this part of h³·x'''.
 const ERROR: f64 = 1.0 / 12.0;
 
-pub(crate) fn step(
-    network: &mut Network,
+pub(crate) async fn step(
+    network: &mut Network<'_>,
     from: &State,
     to: &mut State,
     weights: &[f64],
     work: &mut Work,
+    company: Company<'_>,
 ) -> Result<f64, Cut> {
     let Some(before) = work.history.before() else {
-        return trbdf2::step(network, from, to, weights, work);
+        return trbdf2::step(network, from, to, weights, work, company).await;
     };
     let h = to.t - from.t;
     let alpha = 2.0 / h;
@@ -42,7 +44,7 @@ pub(crate) fn step(
         *beta = -alpha * q - w;
     }
     let stage = Stage { t: to.t, alpha, beta, weights, tolerance: trbdf2::ITERATION, unconfirmed };
-    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
+    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch, company).await?;
     for (rate, (q, beta)) in to.w.iter_mut().zip(to.q.iter().zip(beta.iter())) {
         *rate = alpha * q + beta;
     }

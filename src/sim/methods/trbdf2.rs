@@ -11,6 +11,7 @@
 //! Source: M. E. Hosea, L. F. Shampine, Analysis and implementation of TR-BDF2, Appl. Numer. Math. 20:21-37, 1996.
 
 use super::{Work, filtered_error, weighted};
+use crate::sim::abreast::Company;
 use crate::sim::network::Network;
 use crate::sim::newton::{Cut, Stage, solve_stage};
 use crate::sim::op::State;
@@ -22,12 +23,13 @@ pub(crate) const ITERATION: f64 = 0.02;
 /// The part of the step at which the middle stage stands.
 const GAMMA: f64 = 2.0 - SQRT_2;
 
-pub(crate) fn step(
-    network: &mut Network,
+pub(crate) async fn step(
+    network: &mut Network<'_>,
     from: &State,
     to: &mut State,
     weights: &[f64],
     work: &mut Work,
+    company: Company<'_>,
 ) -> Result<f64, Cut> {
     const D: f64 = GAMMA / 2.0;
     const W: f64 = SQRT_2 / 4.0;
@@ -45,7 +47,7 @@ pub(crate) fn step(
         *beta = -alpha * from.q[k] - from.w[k];
     }
     let stage = Stage { t: middle, alpha, beta, weights, tolerance: ITERATION, unconfirmed };
-    solve_stage(network, &stage, x, q, scratch)?;
+    solve_stage(network, &stage, x, q, scratch, company).await?;
     for (k, w) in w.iter_mut().enumerate() {
         *w = alpha * q[k] + beta[k];
     }
@@ -56,7 +58,7 @@ pub(crate) fn step(
     }
     let stage = Stage { t: to.t, alpha, beta, weights, tolerance: ITERATION, unconfirmed };
     network.remember_junctions(x);
-    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch)?;
+    solve_stage(network, &stage, &mut to.x, &mut to.q, scratch, company).await?;
     for (k, rate) in to.w.iter_mut().enumerate() {
         *rate = alpha * to.q[k] + beta[k];
     }

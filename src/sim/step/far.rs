@@ -1,6 +1,7 @@
 //! Steps by exponentials, which go as far as a corner, and the way back to other methods where that does not do.
 
 use super::{Run, absolute_tolerances, pilot, take_seen};
+use crate::sim::abreast::alone;
 use crate::sim::explain::Failure;
 use crate::sim::methods;
 
@@ -59,7 +60,7 @@ impl Run<'_> {
 
     /// What a pilot pass would have found beforehand.
     pub(super) fn learn_magnitudes(&mut self) -> Result<(), Failure> {
-        if let Some(seen) = pilot(self.network.system, self.settings)? {
+        if let Some(seen) = alone(pilot(self.network.system, self.settings, None))? {
             take_seen(&mut self.network, &seen);
             self.absolute = absolute_tolerances(self.network.system, self.settings, Some(&seen));
         }

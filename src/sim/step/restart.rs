@@ -6,7 +6,7 @@ use crate::linear::Singular;
 use crate::sim::explain::{Failure, Moment, failure};
 use crate::sim::methods::exponential::{self, Space};
 use crate::sim::methods::{self, Method};
-use crate::sim::newton::{Cut, Stage, solve_stage};
+use crate::sim::newton::{Cut, Stage, solve_anew};
 use crate::sim::op::{self, State, Trouble};
 use crate::sim::settings::Side;
 
@@ -302,7 +302,7 @@ impl Run<'_> {
             tolerance: methods::trbdf2::ITERATION,
             unconfirmed: 0.0,
         };
-        solve_stage(network, &stage, &mut next.x, &mut next.q, &mut work.scratch)?;
+        solve_anew(network, &stage, &mut next.x, &mut next.q, &mut work.scratch)?;
         for (k, w) in next.w.iter_mut().enumerate() {
             *w = alpha * next.q[k] + work.beta[k];
         }
