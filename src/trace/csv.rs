@@ -2,12 +2,13 @@
 
 use super::formats::{Failed, Heading, bad, worse};
 use super::{Sink, Trace};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 
 /// Writes rows as they come.
 pub struct Rows<W: Write> {
-    writer: ::csv::Writer<W>,
-    digits: String,
+    writer: BufWriter<W>,
+    /// A row. Numbers need no quotes.
+    line: String,
 }
 
 impl<W: Write> Rows<W> {
@@ -27,8 +28,7 @@ impl<W: Write> Rows<W> {
         });
         let line: Vec<String> = heads.map(|head| quoted(&head)).collect();
         writeln!(to, "{}", line.join(","))?;
-        let writer = ::csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(to);
-        Ok(Rows { writer, digits: String::new() })
+        Ok(Rows { writer: BufWriter::with_capacity(1 << 16, to), line: String::new() })
     }
 
     /// Writes what is still held back and gives the writer back.
@@ -36,18 +36,21 @@ impl<W: Write> Rows<W> {
     /// # Errors
     /// What writing failed with.
     pub fn finish(self) -> io::Result<W> {
-        self.writer.into_inner().map_err(|error| error.into_error())
+        self.writer.into_inner().map_err(io::IntoInnerError::into_error)
     }
 }
 
 impl<W: Write> Sink for Rows<W> {
     fn row(&mut self, values: &[f64]) -> io::Result<()> {
-        for value in values {
-            self.digits.clear();
-            number(*value, &mut self.digits);
-            self.writer.write_field(&self.digits).map_err(plain)?;
+        self.line.clear();
+        for (at, value) in values.iter().enumerate() {
+            if at > 0 {
+                self.line.push(',');
+            }
+            number(*value, &mut self.line);
         }
-        self.writer.write_record(None::<&[u8]>).map_err(plain)
+        self.line.push('\n');
+        self.writer.write_all(self.line.as_bytes())
     }
 }
 
@@ -80,30 +83,20 @@ fn separator(text: &[u8]) -> u8 {
     }
 }
 
-/// The system's own error, whose kind says whether a pipe is broken.
-fn plain(error: ::csv::Error) -> io::Error {
-    match error.into_kind() {
-        ::csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
-    }
-}
-
 /// Appends the shortest decimal number that reads back as the same value; zero has no sign, whole numbers no point.
 pub fn number(value: f64, text: &mut String) {
-    use std::fmt::Write;
     let size = value.abs();
-    // Writing to a String cannot fail.
-    let _ = if value == 0.0 {
-        write!(text, "0")
+    if value == 0.0 {
+        text.push('0');
     } else if !size.is_finite() {
-        write!(text, "{value}")
+        text.push_str(&value.to_string());
     } else if size >= 1e16 {
-        write!(text, "{value:e}")
+        text.push_str(&format!("{value:e}"));
     } else {
         let mut digits = zmij::Buffer::new();
         let digits = digits.format_finite(value);
-        write!(text, "{}", digits.strip_suffix(".0").unwrap_or(digits))
-    };
+        text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
+    }
 }
 
 /// Writes a whole trace.
