@@ -181,13 +181,31 @@ impl Flat<f64> {
 }
 
 impl Flat<Pack> {
-    /// Puts factors into a lane, where they are of the same order; says whether they are.
-    pub fn put(&mut self, flat: &Flat<f64>, lane: usize) -> bool {
+    fn is_like(&self, flat: &Flat<f64>) -> bool {
         let mut turns = self.turns.iter().zip(&flat.turns);
-        let alike = self.lower.places == flat.lower.places
+        self.lower.places == flat.lower.places
             && self.upper.places == flat.upper.places
             && self.turns.len() == flat.turns.len()
-            && turns.all(|((own, _), (other, _))| own == other);
+            && turns.all(|((own, _), (other, _))| own == other)
+    }
+
+    /// Puts factors into all lanes, where they are of the same order; says whether they are.
+    pub fn put_all(&mut self, flat: &Flat<f64>) -> bool {
+        let alike = self.is_like(flat);
+        if alike {
+            let splat = |to: &mut [Pack], from: &[f64]| {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = Pack::splat(*from));
+            };
+            splat(&mut self.lower.values, &flat.lower.values);
+            splat(&mut self.upper.values, &flat.upper.values);
+            splat(&mut self.inverse, &flat.inverse);
+        }
+        alike
+    }
+
+    /// Puts factors into a lane, where they are of the same order; says whether they are.
+    pub fn put(&mut self, flat: &Flat<f64>, lane: usize) -> bool {
+        let alike = self.is_like(flat);
         if alike {
             put_lane(&mut self.lower.values, lane, &flat.lower.values);
             put_lane(&mut self.upper.values, lane, &flat.upper.values);

@@ -4,13 +4,14 @@
 //! frozen network, so that algebraic relations hold. Where that says too little, shorter steps lead from the step's start
 //! to the time: in circuits of index 2, and where a junction bends the solution within the step.
 
-use super::abreast::alone;
+use super::abreast::{Points, alone};
 use super::methods::{self, Asked, Dense, Work, trbdf2};
 use super::network::Network;
 use super::newton::{Cut, Frozen, correct_frozen};
 use super::op::State;
 use super::output::Stopped;
 use super::system::System;
+use crate::linear::LANES;
 
 /// Corrections of one row at most: an exponential that the guess overshoots comes down by one n·Vt each time.
 const MOST_CORRECTIONS: u32 = 40;
@@ -18,6 +19,9 @@ const MOST_CORRECTIONS: u32 = 40;
 /// Within this part of a step of index 2 a row lies on the straight line: a step so short would have only rounding in
 /// its rates.
 const SHORT: f64 = 1e-6;
+
+/// What is corrected by no more than this part of what a step may err by needs no second correction.
+const CORRECTED: f64 = 0.02;
 
 /// Steps to one row at most.
 const MOST_STEPS: u32 = 200;
@@ -43,6 +47,11 @@ pub(crate) struct Inside {
     /// Values of a shorter step, and where the dense output of the whole one waits meanwhile.
     shorter: State,
     dense: Dense,
+    /// Room to correct several points at once, where that is done, and the points of the next rows.
+    points: Option<Points>,
+    foreseen: Vec<State>,
+    /// Whether that is done in this step; `None`: not yet asked.
+    foresees: Option<bool>,
 }
 
 impl Inside {
@@ -60,6 +69,9 @@ impl Inside {
             reached: State::new(f64::NAN, system.equations(), system.charges()),
             shorter: State::new(0.0, system.equations(), system.charges()),
             dense: Dense::new(system.equations(), system.charges()),
+            points: None,
+            foreseen: vec![],
+            foresees: None,
         }
     }
 
@@ -76,6 +88,11 @@ impl Inside {
             let few = Asked { unknowns: inside.unknowns.clone(), charges };
             inside.few = (!system.has_junctions()).then_some(few);
         }
+        if inside.stored.is_empty() {
+            inside.points = Points::new(system, &inside.held);
+            let nowhere = State::new(f64::NAN, system.equations(), system.charges());
+            inside.foreseen = vec![nowhere; if inside.points.is_some() { LANES } else { 0 }];
+        }
         inside
     }
 
@@ -84,6 +101,62 @@ impl Inside {
         self.factorised = None;
         self.rough = None;
         self.reached.t = f64::NAN;
+        self.foresees = None;
+        self.foreseen.iter_mut().for_each(|point| point.t = f64::NAN);
+    }
+
+    /// Whether the values at a time are not known beforehand and might be.
+    pub fn may_foresee(&self, time: f64) -> bool {
+        !self.foreseen.is_empty()
+            && self.foresees != Some(false)
+            && self.foreseen.iter().all(|point| point.t.is_nan() || point.t < time)
+    }
+
+    /// Finds the values at the next times inside a step at once, as [`between`](Inside::between) does one by one, as far as
+    /// one correction suffices.
+    #[allow(clippy::too_many_arguments)]
+    pub fn foresee(
+        &mut self,
+        network: &mut Network,
+        from: &State,
+        to: &State,
+        times: &[f64],
+        index2: bool,
+        weights: &[f64],
+        work: &mut Work,
+    ) {
+        let able = !index2 && !work.dense.by_unknowns && network.is_plain() && times.len() > 1;
+        if *self.foresees.get_or_insert(able && !network.any_ramped()) {
+            self.foresees = Some(self.factorise(network));
+        }
+        let Some(points) = self.points.as_mut().filter(|_| self.foresees == Some(true)) else {
+            return;
+        };
+        self.foresees = Some(points.begin(network));
+        if self.foresees == Some(false) {
+            return;
+        }
+        work.complete(from, to, None);
+        for (lane, (point, time)) in self.foreseen.iter_mut().zip(times).enumerate() {
+            guess(point, from, to, *time, work);
+            points.put(lane, network, point, &mut work.right);
+        }
+        points.correct();
+        for (lane, (point, _)) in self.foreseen.iter_mut().zip(times).enumerate() {
+            let update = points.take(lane, point, weights);
+            if update > CORRECTED {
+                point.t = f64::NAN;
+                continue;
+            }
+            network.statistics.evaluations += 1;
+            network.statistics.solves += 1;
+        }
+    }
+
+    /// Factorises the frozen network for a step, where that is not done; says whether it can be.
+    fn factorise(&mut self, network: &mut Network) -> bool {
+        let held = &self.held;
+        *self.factorised.get_or_insert_with(|| network.factorise_frozen(held).is_ok())
     }
 
     /// Makes what is mostly asked of a step's polynomials.
@@ -103,6 +176,10 @@ impl Inside {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<(), Stopped> {
+        if let Some(point) = self.foreseen.iter().find(|point| point.t == time) {
+            self.point.copy_from(point);
+            return Ok(());
+        }
         let theta = (time - from.t) / (to.t - from.t);
         if self.few.is_none() {
             work.complete(from, to, None);
@@ -131,17 +208,11 @@ impl Inside {
         let asked = &self.asked;
         let rough =
             *self.rough.get_or_insert_with(|| is_rough(network, from, to, asked, weights, work));
-        work.dense.unknowns(theta, from, to, &mut self.point.x);
+        guess(&mut self.point, from, to, time, work);
         if work.dense.by_unknowns {
             network.evaluate(&self.point.x, time);
             network.charges(&self.point.x, &mut self.point.q);
-        } else {
-            work.dense.charges(theta, from, to, &mut self.point.q);
         }
-        for (k, w) in self.point.w.iter_mut().enumerate() {
-            *w = from.w[k] + theta * (to.w[k] - from.w[k]);
-        }
-        self.point.t = time;
         if index2 {
             // Not every unknown follows from the charges: the parabola through the stages stands, where it may.
             return match rough {
@@ -273,12 +344,10 @@ impl Inside {
         weights: &[f64],
         work: &mut Work,
     ) -> Result<bool, Cut> {
+        self.factorise(network);
         let Work { x, w, q, scratch, .. } = work;
         let held = &self.held;
         let frozen = Frozen { t: time, held, targets, floors: weights, most: 1, prime: false };
-        if self.factorised.is_none() {
-            self.factorised = Some(network.factorise_frozen(held).is_ok());
-        }
         for iteration in 0..MOST_CORRECTIONS {
             if self.factorised != Some(true) || iteration >= 2 {
                 // The slopes of the step's start no longer serve.
@@ -290,7 +359,7 @@ impl Inside {
                 self.factorised = Some(true);
             }
             let update = correct_frozen(network, &frozen, x, w, q, scratch);
-            if update <= 0.02 || (iteration == 0 && network.system.is_linear()) {
+            if update <= CORRECTED || (iteration == 0 && network.system.is_linear()) {
                 return Ok(true);
             }
             if !update.is_finite() {
@@ -310,6 +379,19 @@ impl Inside {
         }
         Err(Cut::NonFinite { device: network.non_finite_law() })
     }
+}
+
+/// What a step's polynomials say of a time within it; of the charges too, where they are what is interpolated.
+fn guess(point: &mut State, from: &State, to: &State, time: f64, work: &Work) {
+    let theta = (time - from.t) / (to.t - from.t);
+    work.dense.unknowns(theta, from, to, &mut point.x);
+    if !work.dense.by_unknowns {
+        work.dense.charges(theta, from, to, &mut point.q);
+    }
+    for (k, w) in point.w.iter_mut().enumerate() {
+        *w = from.w[k] + theta * (to.w[k] - from.w[k]);
+    }
+    point.t = time;
 }
 
 /// Of each unknown that an output column is, the linear storage that it alone makes up; nothing where one has none.

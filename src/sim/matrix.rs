@@ -9,6 +9,8 @@ use crate::linear::{Factors, Flat, Orders, Singular, Unfit};
 pub(crate) struct Matrix {
     pub values: Vec<f64>,
     factors: Option<Factors>,
+    /// How many factors the run had made until these.
+    number: u64,
     /// Whether entries that were 0 have become others.
     changes: bool,
     /// The modes that the pivots are for, and pivots that others had.
@@ -56,6 +58,7 @@ impl Matrix {
         orders: &mut Orders,
         statistics: &mut Statistics,
     ) -> Result<(), Singular> {
+        self.number = statistics.factorisations + statistics.refactorisations + 1;
         if let Some(factors) = &mut self.factors {
             statistics.refactorisations += 1;
             match factors.refactor(&self.values) {
@@ -74,9 +77,9 @@ impl Matrix {
         Ok(())
     }
 
-    /// Its two triangles as flat lists, where solving goes by these.
-    pub fn flat(&self) -> Option<&Flat<f64>> {
-        self.factors.as_ref()?.flat()
+    /// Its two triangles as flat lists, where solving goes by these; with a number that no other factors of the run have.
+    pub fn flat(&self) -> (u64, Option<&Flat<f64>>) {
+        (self.number, self.factors.as_ref().and_then(Factors::flat))
     }
 
     /// Whether its determinant is negative, where that can be told.

@@ -60,9 +60,8 @@ struct Stages {
     matrix: Matrix,
     /// α of the factors, where they depend on nothing else.
     constant_alpha: Option<f64>,
-    /// α of the factors, whatever else they depend on, and how many were made until then.
+    /// α of the factors, whatever else they depend on.
     alpha: Option<f64>,
-    number: u64,
     /// Junction voltages that they were made at.
     voltages: Vec<f64>,
 }
@@ -223,9 +222,14 @@ impl<'a> Network<'a> {
         self.gmin == 0.0 && self.pins.is_empty()
     }
 
-    /// The factors at hand as flat lists, where they are such, with their number in the order in which they were made.
+    /// The factors at hand as flat lists, where they are such, with a number that no others have.
     pub fn dynamic_factors(&self) -> (u64, Option<&Flat<f64>>) {
-        (self.stages.number, self.stages.matrix.flat())
+        self.stages.matrix.flat()
+    }
+
+    /// The same of the frozen network.
+    pub fn frozen_factors(&self) -> (u64, Option<&Flat<f64>>) {
+        self.frozen.flat()
     }
 
     fn set_inputs(&mut self, x: &[f64], t: f64) {
@@ -563,7 +567,6 @@ impl<'a> Network<'a> {
         let constant = result.is_ok() && self.system.is_linear();
         stages.constant_alpha = constant.then_some(alpha);
         stages.alpha = result.is_ok().then_some(alpha);
-        stages.number = self.statistics.factorisations + self.statistics.refactorisations;
         result
     }
 

@@ -8,6 +8,7 @@ use super::network::Network;
 use super::newton::Cut;
 use super::op::State;
 use super::settings::{Interval, Settings};
+use crate::linear::LANES;
 use crate::trace::Sink;
 use std::io;
 
@@ -151,6 +152,22 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// The times of the next rows before a time, and how many they are.
+    fn next_times(&mut self, end: f64) -> ([f64; LANES], usize) {
+        let next = self.next;
+        let (mut times, mut count) = ([0.0; LANES], 0);
+        while count < LANES {
+            times[count] = self.next_time();
+            if times[count] >= end {
+                break;
+            }
+            count += 1;
+            self.next += 1;
+        }
+        self.next = next;
+        (times, count)
+    }
+
     /// Whether a row of a grid or list is due before a time.
     pub fn are_due(&mut self, time: f64) -> bool {
         self.next_time() < time
@@ -195,6 +212,11 @@ impl<'a> Rows<'a> {
             let due = self.next_time();
             if due >= to.t - self.slack {
                 return Ok(());
+            }
+            if self.inside.may_foresee(due) {
+                let (times, count) = self.next_times(to.t - self.slack);
+                let times = &times[..count];
+                self.inside.foresee(network, from, to, times, index2, weights, work);
             }
             self.next += 1;
             self.inside.between(network, from, to, due, index2, weights, work)?;

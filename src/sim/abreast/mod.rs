@@ -7,20 +7,19 @@
 //!
 //! A run that waits is a future that is pending, and there is nothing else that it could wait for.
 
-use super::laws::Abreast;
+mod equations;
+mod points;
+
+use self::equations::Equations;
+pub(crate) use self::points::Points;
 use super::network::Network;
 use super::newton::Stage;
-use super::sparse::Rows;
-use super::system::{System, Target};
-use crate::circuit::stamps::Junction;
+use super::system::System;
 use crate::linear::{Flat, LANES, Number, Pack, put_lane, take_lane};
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, Waker};
-
-/// Larger circuits have too little of what is done in lanes, and too much that would have to be held for it.
-const LARGEST: usize = 256;
 
 /// Runs that go abreast.
 #[derive(Debug, Default)]
@@ -193,8 +192,8 @@ impl Seated<'_> {
             take_lane(&plan.update, lane, update);
             take_lane(&plan.led, lane, q);
         } else {
-            take_lane(&plan.residual, lane, update);
-            take_lane(&plan.q, lane, q);
+            take_lane(&plan.equations.residual, lane, update);
+            take_lane(&plan.equations.q, lane, q);
         }
         solved
     }
@@ -226,132 +225,46 @@ struct Table {
 /// What iterations of a circuit take, with each lane's values.
 #[derive(Debug)]
 struct Plan {
-    time_input: usize,
-    mode_slots: usize,
-    groups: Vec<Laws>,
-    conductances: Rows<Pack>,
-    charges: Rows<Pack>,
-    rates: Rows<Pack>,
+    equations: Equations,
     factors: Factors,
-    /// What lanes ask with: unknowns, times and modes; what of the residual comes from sources; α and β, or rates.
-    inputs: Vec<Pack>,
-    drives: Vec<Pack>,
+    /// α and β, or rates.
     alpha: Pack,
     beta: Vec<Pack>,
     /// 1 for a stage of a Rosenbrock method, 0 for an iteration; and what a stage has more in its residual.
     is_stage: Pack,
     more: Vec<Pack>,
-    /// What they are given: charges there and, as far as they are linear, where the update leads; residuals and updates.
-    q: Vec<Pack>,
-    led: Vec<Pack>,
-    residual: Vec<Pack>,
+    /// What comes of it: updates, and charges where they lead, as far as they are linear.
     update: Vec<Pack>,
+    led: Vec<Pack>,
     work: Vec<Pack>,
-}
-
-/// A group of laws.
-#[derive(Debug)]
-struct Laws {
-    /// The programs; nothing of laws that are affine for fixed modes, whose values each run has at hand.
-    programs: Option<Abreast>,
-    junction: Option<Junction>,
-    values: Vec<Pack>,
-    /// Which value goes into which equation, with what factor; which into which charge.
-    equations: Vec<(u32, u32)>,
-    factors: Vec<Pack>,
-    charges: Vec<(u32, u32)>,
-}
-
-impl Laws {
-    fn new(group: &super::system::LawGroup) -> Laws {
-        let (mut equations, mut factors, mut charges) = (vec![], vec![], vec![]);
-        for (k, target) in group.targets.iter().enumerate() {
-            match target {
-                Target::Equations(into) => into.iter().for_each(|(row, factor)| {
-                    equations.push((k as u32, *row));
-                    factors.push(Pack::splat(*factor));
-                }),
-                Target::Charge(charge) => charges.push((k as u32, *charge)),
-            }
-        }
-        Laws {
-            programs: (!group.modal).then(|| Abreast::new(&group.laws)),
-            junction: group.junction,
-            values: vec![Pack::ZERO; group.targets.len()],
-            equations,
-            factors,
-            charges,
-        }
-    }
-
-    fn put(&mut self, group: &super::system::LawGroup, lane: usize) -> bool {
-        let own = Laws::new(group);
-        let across = |junction: &Option<Junction>| junction.map(|junction| junction.across);
-        let alike = self.values.len() == own.values.len()
-            && across(&self.junction) == across(&own.junction)
-            && (&self.equations, &self.charges) == (&own.equations, &own.charges)
-            && match &mut self.programs {
-                Some(programs) => !group.modal && programs.put(&group.laws, lane),
-                None => group.modal,
-            };
-        if alike {
-            let factors = self.factors.iter_mut().zip(own.factors);
-            factors.for_each(|(factor, own)| factor.0[lane] = own.0[lane]);
-        }
-        alike
-    }
 }
 
 impl Plan {
     fn new(system: &System) -> Option<Plan> {
         let (n, charges) = (system.equations(), system.charges());
-        if system.is_linear() || n > LARGEST {
-            return None;
-        }
         Some(Plan {
-            time_input: system.time_input,
-            mode_slots: system.mode_slots,
-            groups: system.groups.iter().map(Laws::new).collect(),
-            conductances: system.conductances.abreast(),
-            charges: system.charges.abreast(),
-            rates: system.rates.abreast(),
+            equations: Equations::new(system)?,
             factors: Factors::default(),
-            inputs: vec![Pack::ZERO; system.inputs()],
-            drives: vec![Pack::ZERO; n],
             alpha: Pack::ZERO,
             beta: vec![Pack::ZERO; charges],
             is_stage: Pack::ZERO,
             more: vec![Pack::ZERO; n],
-            q: vec![Pack::ZERO; charges],
-            led: vec![Pack::ZERO; charges],
-            residual: vec![Pack::ZERO; n],
             update: vec![Pack::ZERO; n],
+            led: vec![Pack::ZERO; charges],
             work: vec![Pack::ZERO; n],
         })
     }
 
     /// Puts a circuit into a lane; says whether it fits.
     fn put(&mut self, system: &System, lane: usize) -> bool {
-        let inputs = (self.time_input, self.mode_slots, self.inputs.len());
-        let fits = inputs == (system.time_input, system.mode_slots, system.inputs())
-            && self.drives.len() == system.equations()
-            && self.groups.len() == system.groups.len()
-            && self.conductances.put(&system.conductances, lane)
-            && self.charges.put(&system.charges, lane)
-            && self.rates.put(&system.rates, lane)
-            && self.groups.iter_mut().zip(&system.groups).all(|(own, group)| own.put(group, lane));
         self.factors.forget(lane);
-        fits
+        self.equations.put(system, lane)
     }
 
     /// Takes the question of a lane.
     fn ask(&mut self, lane: usize, network: &mut Network, question: &Question) {
         let Question { t, x, drives, rates } = question;
-        let (unknowns, others) = self.inputs.split_at_mut(self.time_input);
-        put_lane(unknowns, lane, x);
-        others[0].0[lane] = *t;
-        put_lane(&mut others[1..], lane, &network.modes);
-        put_lane(&mut self.drives, lane, drives);
+        self.equations.ask(lane, network, (*t, x), drives);
         match rates {
             Rates::Of(alpha, beta) => {
                 self.is_stage.0[lane] = 0.0;
@@ -371,43 +284,13 @@ impl Plan {
                 }
             }
         }
-        for (k, laws) in self.groups.iter_mut().enumerate() {
-            if laws.programs.is_none() {
-                put_lane(&mut laws.values, lane, network.modal_values(k, x, *t));
-            }
-        }
         self.factors.follow(lane, network);
     }
 
-    /// One iteration in every lane. What stands in lanes that have not asked for one does no harm.
+    /// One iteration or stage in every lane. What stands in lanes that have not asked for one does no harm.
     fn pass(&mut self) {
-        let n = self.drives.len();
-        let Plan { groups, inputs, q, residual, .. } = self;
-        for laws in groups.iter_mut() {
-            if let Some(junction) = &laws.junction {
-                let [anode, cathode] =
-                    junction.across.map(|end| end.map_or(Pack::ZERO, |k| inputs[k.0 as usize]));
-                inputs[self.time_input - 1] = anode - cathode;
-            }
-            if let Some(programs) = &mut laws.programs {
-                programs.values(inputs, &mut laws.values);
-            }
-        }
-        let one = Pack::splat(1.0);
-        q.fill(Pack::ZERO);
-        self.charges.add_product(one, &inputs[..n], q);
-        residual.copy_from_slice(&self.drives);
-        self.conductances.add_product(one, &inputs[..n], residual);
-        for laws in groups.iter() {
-            for (value, charge) in &laws.charges {
-                let q = &mut q[*charge as usize];
-                *q = *q + laws.values[*value as usize];
-            }
-            for ((value, row), factor) in laws.equations.iter().zip(&laws.factors) {
-                let r = &mut residual[*row as usize];
-                *r = *r + *factor * laws.values[*value as usize];
-            }
-        }
+        self.equations.evaluate();
+        let Equations { q, residual, charges, rates, .. } = &mut self.equations;
         let is_stage = self.is_stage;
         let of_stage = |stage: f64, a: f64, b: f64| if stage != 0.0 { a } else { b };
         if !is_stage.every(|stage| stage == 0.0) {
@@ -419,7 +302,7 @@ impl Plan {
         for (rate, q) in self.beta.iter_mut().zip(&*q) {
             *rate = is_stage.with_two(*rate, self.alpha * *q + *rate, of_stage);
         }
-        self.rates.add_transposed(one, &self.beta, residual);
+        rates.add_transposed(Pack::splat(1.0), &self.beta, residual);
         if let Some(flat) = &self.factors.flat {
             self.update.copy_from_slice(residual);
             flat.solve(&mut self.update, &mut self.work);
@@ -427,7 +310,7 @@ impl Plan {
                 *led = is_stage.with_two(Pack::ZERO, *q, of_stage);
             }
             let sign = is_stage.map(|stage| of_stage(stage, 1.0, -1.0));
-            self.charges.add_product(sign, &self.update, &mut self.led);
+            charges.add_product(sign, &self.update, &mut self.led);
         }
     }
 }
