@@ -62,7 +62,7 @@ pub struct Arguments {
     /// What random values follow from
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Runs at a time; without it as many as there are processors
+    /// Threads, each of which makes up to four runs at a time; without it as many as there are processors
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
     /// Make only part K of N; OUT becomes OUT.KofN. In an array of a batch system its task says so

@@ -56,6 +56,8 @@ impl Group {
         let (mut more, mut back) = (true, false);
         loop {
             let mut waiting = false;
+            let occupied = runs.iter().flatten().count();
+            self.table.borrow_mut().company = if more { width } else { occupied };
             // To and fro: what is at hand in the nearest memory is that of the run that was last.
             back = !back;
             for turn in 0..width {
@@ -80,10 +82,17 @@ impl Group {
             if !waiting {
                 return;
             }
-            if let Some(plan) = &mut self.table.borrow_mut().plan {
+            let mut table = self.table.borrow_mut();
+            table.passes += 1;
+            if let Some(plan) = &mut table.plan {
                 plan.pass();
             }
         }
+    }
+
+    /// How many passes have been made, each of an iteration or stage for every run that wanted one.
+    pub fn passes(&self) -> u64 {
+        self.table.borrow().passes
     }
 }
 
@@ -120,7 +129,7 @@ impl Drop for Seated<'_> {
 
 impl Seated<'_> {
     /// One iteration: leaves what W(α)⁻¹ makes of the residual in `update`, and in `q` the charges where that leads, as far
-    /// as they are linear. Not where the network is otherwise than in a run over time; says whether it has.
+    /// as they are linear. Not where a run had better do that by itself; says whether it has.
     pub async fn iterate(
         &self,
         network: &mut Network<'_>,
@@ -129,7 +138,7 @@ impl Seated<'_> {
         q: &mut [f64],
         update: &mut [f64],
     ) -> bool {
-        if !network.is_plain() {
+        if !self.may_ask(network) {
             return false;
         }
         network.begin_residual(stage.t, update);
@@ -145,7 +154,7 @@ impl Seated<'_> {
     }
 
     /// One stage of a Rosenbrock method: leaves W(α)⁻¹·(b − G·x − f + `more` + A·`rates`) in `update`, and the linear charges
-    /// of that in `q`; `more` are multiples of slopes. Under the same condition.
+    /// of that in `q`; `more` are multiples of slopes. The same holds.
     pub async fn stage(
         &self,
         network: &mut Network<'_>,
@@ -154,7 +163,7 @@ impl Seated<'_> {
         rates: &[f64],
         [update, q]: [&mut [f64]; 2],
     ) -> bool {
-        if !network.is_plain() {
+        if !self.may_ask(network) {
             return false;
         }
         network.begin_residual(t, update);
@@ -166,6 +175,12 @@ impl Seated<'_> {
             network.add_linear_change(1.0, update, q);
         }
         true
+    }
+
+    /// Whether the network is as it is in a run over time, and others are there or will come: a pass costs more than what it
+    /// does for one.
+    fn may_ask(&self, network: &Network) -> bool {
+        network.is_plain() && self.0.group.table.borrow().company > 1
     }
 
     /// Waits until the question is answered.
@@ -220,6 +235,9 @@ enum Rates<'a> {
 struct Table {
     taken: [bool; LANES],
     plan: Option<Plan>,
+    /// How many runs there are, or may be.
+    company: usize,
+    passes: u64,
 }
 
 /// What iterations of a circuit take, with each lane's values.
