@@ -152,3 +152,32 @@ fn runs_equal_single_runs_bit_for_bit() {
         assert_eq!(table[run].last(), Some(&last));
     }
 }
+
+/// What is set makes another course of a source (compiled once for all), another value, or another circuit.
+#[test]
+fn runs_of_a_deck_equal_single_runs_bit_for_bit() {
+    let folder = folder();
+    let deck = "a servo\n.param high=2 gain=5 bend=0\nVref ref 0 PULSE(0 {high} 1m 1m 1m 40m 100m)\n\
+        Be e 0 V=tanh(V(ref)-V(x))*gain\nRe e u 500\nCu u 0 1u\nBx 0 x I=1e-3*V(u)-1e-3*V(x)-bend*V(x)^3\nCx x 0 20u\n\
+        .save v(x) v(e)\n.tran 0.2m 60m 0 0.2m uic\n.end\n";
+    std::fs::write(folder.path().join("servo.cir"), deck).unwrap();
+    for vary in ["high=1..3:6", "gain=4..6:6", "bend=0,1e-4,2e-4,0,0,3e-4", "high=0..2:6"] {
+        let traces = vary.split_once('=').unwrap().0;
+        let arguments = ["--vary", vary, "--measure", "end=final(v(x))", "--traces", traces];
+        let table = [&["sweep", "servo.cir", "--threads", "1", "--step", "1ms"][..], &arguments];
+        let table = table.concat();
+        let table = rows(&made(folder.path(), &table));
+        assert_eq!(table.len(), 6);
+        for row in &table {
+            let set = format!("{traces}={}", row[1]);
+            let single = ["simulate", "servo.cir", "--set", &set, "--observe", "v(x)"];
+            let single = made(folder.path(), &[&single[..], &["--step", "1ms"]].concat());
+            let trace = folder.path().join(format!("{traces}/run-{}.csv", row[0]));
+            assert_eq!(single, std::fs::read_to_string(trace).unwrap(), "{set}");
+            let last = single.lines().last().unwrap().split(',').nth(1).unwrap();
+            let last: f64 = last.parse().unwrap();
+            // Rows are corrected where steps end; what is measured there is within rounding of that.
+            assert!((row[2] - last).abs() <= 1e-12 * last.abs(), "{set}: {} {last}", row[2]);
+        }
+    }
+}
