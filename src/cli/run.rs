@@ -213,13 +213,7 @@ fn ready_like(
         // All that follows is made of the stamps: of a large circuit the devices take as much memory as the run.
         circuit.devices = vec![];
     }
-    let over_time = matches!(analysis, Analysis::Transient { .. });
-    let like = like.filter(|like| over_time && like.is_one_over_time());
-    let known = like.and_then(|like| sim::compile_like(&stamps, &like.stamps, &like.system));
-    let system = match known {
-        Some(system) => system,
-        None => compiled(&analysis, &stamps, d)?,
-    };
+    let system = compiled(&analysis, &stamps, like, d)?;
     let row = analyses::row(analysis.name())?;
     let stepped = (!circuit.steps.is_empty()).then(|| ("step".to_string(), ""));
     let columns = stepped.into_iter().chain((row.columns)(&analysis, &circuit, &stamps));
@@ -274,12 +268,20 @@ fn ready_like(
     })
 }
 
-/// A circuit compiled for an analysis.
-fn compiled(analysis: &Analysis, stamps: &Stamps, d: &mut Vec<Diagnostic>) -> Option<System> {
-    match analysis {
-        Analysis::Transient { .. } => sim::compile_for_run(stamps, d),
-        _ => sim::compile(stamps, d),
+/// A circuit compiled for an analysis; not anew where what was compiled for a run over time serves with other sources.
+fn compiled(
+    analysis: &Analysis,
+    stamps: &Stamps,
+    like: Option<&Run>,
+    d: &mut Vec<Diagnostic>,
+) -> Option<System> {
+    let over_time = |analysis: &Analysis| matches!(analysis, Analysis::Transient { .. });
+    if !over_time(analysis) {
+        return sim::compile(stamps, d);
     }
+    let like = like.filter(|like| over_time(&like.analysis));
+    let known = like.and_then(|like| sim::compile_like(stamps, &like.stamps, &like.system));
+    known.or_else(|| sim::compile_for_run(stamps, d))
 }
 
 /// Analyses that could be run; the one that sensitivities go along with is none of its own.
@@ -417,7 +419,7 @@ impl Run {
         let mut d = vec![];
         let stamps = stamps::stamp(&circuit, &mut d);
         let made = stamps.and_then(|stamps| {
-            compiled(&self.analysis, &stamps, &mut d).map(|system| (stamps, system))
+            compiled(&self.analysis, &stamps, Some(self), &mut d).map(|system| (stamps, system))
         });
         let Some((stamps, system)) = made else { return Err(input(d)) };
         if stamps.outputs.len() != self.stamps.outputs.len() {

@@ -191,25 +191,22 @@ impl Flat<Pack> {
 
     /// Puts factors into all lanes, where they are of the same order; says whether they are.
     pub fn put_all(&mut self, flat: &Flat<f64>) -> bool {
-        let alike = self.is_like(flat);
-        if alike {
-            let splat = |to: &mut [Pack], from: &[f64]| {
-                to.iter_mut().zip(from).for_each(|(to, from)| *to = Pack::splat(*from));
-            };
-            splat(&mut self.lower.values, &flat.lower.values);
-            splat(&mut self.upper.values, &flat.upper.values);
-            splat(&mut self.inverse, &flat.inverse);
-        }
-        alike
+        self.put_by(flat, |to, from| {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = Pack::splat(*from));
+        })
     }
 
     /// Puts factors into a lane, where they are of the same order; says whether they are.
     pub fn put(&mut self, flat: &Flat<f64>, lane: usize) -> bool {
+        self.put_by(flat, |to, from| put_lane(to, lane, from))
+    }
+
+    fn put_by(&mut self, flat: &Flat<f64>, put: impl Fn(&mut [Pack], &[f64])) -> bool {
         let alike = self.is_like(flat);
         if alike {
-            put_lane(&mut self.lower.values, lane, &flat.lower.values);
-            put_lane(&mut self.upper.values, lane, &flat.upper.values);
-            put_lane(&mut self.inverse, lane, &flat.inverse);
+            put(&mut self.lower.values, &flat.lower.values);
+            put(&mut self.upper.values, &flat.upper.values);
+            put(&mut self.inverse, &flat.inverse);
         }
         alike
     }

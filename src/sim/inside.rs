@@ -7,7 +7,7 @@
 use super::abreast::{Points, alone};
 use super::methods::{self, Asked, Dense, Work, trbdf2};
 use super::network::Network;
-use super::newton::{Cut, Frozen, correct_frozen};
+use super::newton::{Cut, Frozen, correct_frozen, subtract};
 use super::op::State;
 use super::output::Stopped;
 use super::system::System;
@@ -50,8 +50,8 @@ pub(crate) struct Inside {
     /// Room to correct several points at once, where that is done, and the points of the next rows.
     points: Option<Points>,
     foreseen: Vec<State>,
-    /// Whether that is done in this step; `None`: not yet asked.
-    foresees: Option<bool>,
+    /// Whether that is not done in this step any more.
+    gives_up: bool,
 }
 
 impl Inside {
@@ -71,7 +71,7 @@ impl Inside {
             dense: Dense::new(system.equations(), system.charges()),
             points: None,
             foreseen: vec![],
-            foresees: None,
+            gives_up: false,
         }
     }
 
@@ -101,14 +101,14 @@ impl Inside {
         self.factorised = None;
         self.rough = None;
         self.reached.t = f64::NAN;
-        self.foresees = None;
+        self.gives_up = false;
         self.foreseen.iter_mut().for_each(|point| point.t = f64::NAN);
     }
 
     /// Whether the values at a time are not known beforehand and might be.
     pub fn may_foresee(&self, time: f64) -> bool {
         !self.foreseen.is_empty()
-            && self.foresees != Some(false)
+            && !self.gives_up
             && self.foreseen.iter().all(|point| point.t.is_nan() || point.t < time)
     }
 
@@ -125,17 +125,17 @@ impl Inside {
         weights: &[f64],
         work: &mut Work,
     ) {
-        let able = !index2 && !work.dense.by_unknowns && network.is_plain() && times.len() > 1;
-        if *self.foresees.get_or_insert(able && !network.any_ramped()) {
-            self.foresees = Some(self.factorise(network));
-        }
-        let Some(points) = self.points.as_mut().filter(|_| self.foresees == Some(true)) else {
+        let able = !index2
+            && !work.dense.by_unknowns
+            && network.is_plain()
+            && !network.any_ramped()
+            && times.len() > 1
+            && self.factorise(network);
+        let points = self.points.as_mut().filter(|_| able);
+        let Some(points) = points.and_then(|points| points.begin(network).then_some(points)) else {
+            self.gives_up = true;
             return;
         };
-        self.foresees = Some(points.begin(network));
-        if self.foresees == Some(false) {
-            return;
-        }
         work.complete(from, to, None);
         for (lane, (point, time)) in self.foreseen.iter_mut().zip(times).enumerate() {
             guess(point, from, to, *time, work);
@@ -143,8 +143,9 @@ impl Inside {
         }
         points.correct();
         for (lane, (point, _)) in self.foreseen.iter_mut().zip(times).enumerate() {
-            let update = points.take(lane, point, weights);
-            if update > CORRECTED {
+            let correction = &mut work.scratch.residual;
+            points.take(lane, correction);
+            if subtract(correction, &mut point.x, &mut point.w, weights) > CORRECTED {
                 point.t = f64::NAN;
                 continue;
             }

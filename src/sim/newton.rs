@@ -444,18 +444,24 @@ pub(crate) fn correct_frozen(
     q: &mut [f64],
     scratch: &mut Scratch,
 ) -> f64 {
-    let n = x.len();
     network.evaluate(x, frozen.t);
     network.charges(x, q);
     frozen_residual(network, frozen, x, w, q, &mut scratch.residual);
     network.solve_frozen(&mut scratch.residual);
+    subtract(&scratch.residual, x, w, frozen.floors)
+}
+
+/// Subtracts a correction of unknowns and rates. Gives the largest one of an unknown as a part of its weight; infinite where
+/// one is no number.
+pub(super) fn subtract(correction: &[f64], x: &mut [f64], w: &mut [f64], weights: &[f64]) -> f64 {
+    let (unknowns, rates) = correction.split_at(x.len());
     let mut update: f64 = 0.0;
-    for ((x, dx), weight) in x.iter_mut().zip(&scratch.residual[..n]).zip(frozen.floors) {
+    for ((x, dx), weight) in x.iter_mut().zip(unknowns).zip(weights) {
         *x -= dx;
         let size = dx.abs() / weight;
         update = if size.is_nan() { f64::INFINITY } else { update.max(size) };
     }
-    for (w, dw) in w.iter_mut().zip(&scratch.residual[n..]) {
+    for (w, dw) in w.iter_mut().zip(rates) {
         *w -= dw;
     }
     update

@@ -348,6 +348,9 @@ impl<'a> Run<'a> {
     }
 
     async fn run(&mut self, company: Company<'_>) -> Result<(), Failure> {
+        if let Some(seated) = company {
+            seated.begin();
+        }
         self.start()?;
         while self.state.t < self.settings.stop - self.smallest {
             if self.rows.is_none() && self.has_seen_enough() {

@@ -35,46 +35,54 @@ struct Laws {
     junction: Option<Junction>,
     values: Vec<Pack>,
     /// Which value goes into which equation, with what factor; which into which charge.
-    equations: Vec<(u32, u32)>,
+    equations: Places,
     factors: Vec<Pack>,
-    charges: Vec<(u32, u32)>,
+    charges: Places,
+}
+
+/// Values by number, and what each goes into.
+type Places = Vec<(u32, u32)>;
+
+/// Which value goes into which equation, the factors of that, and which value goes into which charge.
+fn places(group: &LawGroup) -> (Places, Vec<f64>, Places) {
+    let (mut equations, mut factors, mut charges) = (vec![], vec![], vec![]);
+    for (k, target) in group.targets.iter().enumerate() {
+        match target {
+            Target::Equations(into) => into.iter().for_each(|(row, factor)| {
+                equations.push((k as u32, *row));
+                factors.push(*factor);
+            }),
+            Target::Charge(charge) => charges.push((k as u32, *charge)),
+        }
+    }
+    (equations, factors, charges)
 }
 
 impl Laws {
     fn new(group: &LawGroup) -> Laws {
-        let (mut equations, mut factors, mut charges) = (vec![], vec![], vec![]);
-        for (k, target) in group.targets.iter().enumerate() {
-            match target {
-                Target::Equations(into) => into.iter().for_each(|(row, factor)| {
-                    equations.push((k as u32, *row));
-                    factors.push(Pack::splat(*factor));
-                }),
-                Target::Charge(charge) => charges.push((k as u32, *charge)),
-            }
-        }
+        let (equations, factors, charges) = places(group);
         Laws {
             programs: (!group.modal).then(|| Abreast::new(&group.laws)),
             junction: group.junction,
             values: vec![Pack::ZERO; group.targets.len()],
             equations,
-            factors,
+            factors: factors.into_iter().map(Pack::splat).collect(),
             charges,
         }
     }
 
     fn put(&mut self, group: &LawGroup, lane: usize) -> bool {
-        let own = Laws::new(group);
+        let (equations, factors, charges) = places(group);
         let across = |junction: &Option<Junction>| junction.map(|junction| junction.across);
-        let alike = self.values.len() == own.values.len()
-            && across(&self.junction) == across(&own.junction)
-            && (&self.equations, &self.charges) == (&own.equations, &own.charges)
+        let alike = self.values.len() == group.targets.len()
+            && across(&self.junction) == across(&group.junction)
+            && (&self.equations, &self.charges) == (&equations, &charges)
             && match &mut self.programs {
                 Some(programs) => !group.modal && programs.put(&group.laws, lane),
                 None => group.modal,
             };
         if alike {
-            let factors = self.factors.iter_mut().zip(own.factors);
-            factors.for_each(|(factor, own)| factor.0[lane] = own.0[lane]);
+            put_lane(&mut self.factors, lane, &factors);
         }
         alike
     }

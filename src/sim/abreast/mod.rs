@@ -123,11 +123,23 @@ impl<'g> Seat<'g> {
 
 impl Drop for Seated<'_> {
     fn drop(&mut self) {
-        self.0.group.table.borrow_mut().taken[self.0.lane] = false;
+        let Seat { group, lane } = self.0;
+        let mut table = group.table.borrow_mut();
+        table.taken[lane] = false;
+        if let Some(plan) = &mut table.plan {
+            plan.factors.forget(lane);
+        }
     }
 }
 
 impl Seated<'_> {
+    /// Another network begins, which numbers its factors from anew.
+    pub fn begin(&self) {
+        if let Some(plan) = &mut self.0.group.table.borrow_mut().plan {
+            plan.factors.forget(self.0.lane);
+        }
+    }
+
     /// One iteration: leaves what W(α)⁻¹ makes of the residual in `update`, and in `q` the charges where that leads, as far
     /// as they are linear. Not where a run had better do that by itself; says whether it has.
     pub async fn iterate(
@@ -275,7 +287,6 @@ impl Plan {
 
     /// Puts a circuit into a lane; says whether it fits.
     fn put(&mut self, system: &System, lane: usize) -> bool {
-        self.factors.forget(lane);
         self.equations.put(system, lane)
     }
 
@@ -358,16 +369,12 @@ impl Factors {
         }
         self.known[lane] = None;
         let Some(flat) = flat else { return };
-        if self.known.iter().all(Option::is_none) && !self.put(flat, lane) {
-            // Nobody solves by this order any more.
+        let mut serves = self.flat.as_mut().is_some_and(|own| own.put(flat, lane));
+        if !serves && self.known.iter().all(Option::is_none) {
+            // Nobody solves by that order any more.
             self.flat = Some(flat.abreast());
-            self.known[lane] = Some(number);
-        } else if self.put(flat, lane) {
-            self.known[lane] = Some(number);
+            serves = true;
         }
-    }
-
-    fn put(&mut self, flat: &Flat<f64>, lane: usize) -> bool {
-        self.flat.as_mut().is_some_and(|own| own.put(flat, lane))
+        self.known[lane] = serves.then_some(number);
     }
 }

@@ -1,7 +1,7 @@
 //! Points of one run corrected several at once: rows within a step, which wait for nothing of each other.
 
 use super::equations::Equations;
-use crate::linear::{Flat, Number, Pack, put_lane};
+use crate::linear::{Flat, Number, Pack, put_lane, take_lane};
 use crate::sim::network::Network;
 use crate::sim::op::State;
 use crate::sim::system::System;
@@ -74,17 +74,8 @@ impl Points {
         }
     }
 
-    /// Corrects the point of a lane. Gives the largest correction of an unknown as a part of its weight; infinite where one
-    /// is no number.
-    pub fn take(&self, lane: usize, point: &mut State, weights: &[f64]) -> f64 {
-        let (unknowns, rates) = self.vector.split_at(point.x.len());
-        let mut update: f64 = 0.0;
-        for ((x, dx), weight) in point.x.iter_mut().zip(unknowns).zip(weights) {
-            *x -= dx.0[lane];
-            let size = dx.0[lane].abs() / weight;
-            update = if size.is_nan() { f64::INFINITY } else { update.max(size) };
-        }
-        point.w.iter_mut().zip(rates).for_each(|(w, dw)| *w -= dw.0[lane]);
-        update
+    /// The correction of a lane: unknowns, then rates.
+    pub fn take(&self, lane: usize, correction: &mut [f64]) {
+        take_lane(&self.vector, lane, correction);
     }
 }
